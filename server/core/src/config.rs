@@ -1,0 +1,37 @@
+//! Every setting with its default beside it. One configuration is meant to serve every building.
+
+use serde::{Deserialize, Serialize};
+
+/// Settings of a [`crate::Mapper`].
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Config {
+    /// Particles.
+    pub particles: u32,
+    /// Seed of every random draw.
+    pub seed: u64,
+    /// Whether sentences are listened to at all.
+    pub language: bool,
+    /// Whether names propose edges, eqs. (8–9).
+    pub semantic_edges: bool,
+    /// Path between successive places.
+    pub place_spacing_m: f64,
+    /// γ of eq. (6).
+    pub gamma_per_m2: f64,
+    /// Resample when the effective sample size falls below this share of the particles.
+    pub resample_below: f64,
+}
+
+impl Default for Config {
+    fn default() -> Self {
+        Self {
+            particles: 30,
+            seed: 1,
+            language: true,
+            semantic_edges: true,
+            place_spacing_m: 1.0,
+            gamma_per_m2: 0.2,
+            resample_below: 0.5,
+        }
+    }
+}

@@ -1,0 +1,157 @@
+//! What an event brought about: the one source of reports, feedback and debugging.
+
+use crate::event::StampNs;
+use crate::geometry::Pose2;
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+/// A place: a vertex of the graph. Never reused.
+pub type PlaceId = u64;
+
+/// What one [`crate::Mapper::step`] brought about, in order.
+pub type Effects = Vec<Effect>;
+
+/// How an edge between two places came about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum EdgeKind {
+    /// Proposed because the two are near, eqs. (6–7).
+    Distance,
+    /// Proposed because the two are called alike, eqs. (8–9).
+    Semantic,
+    /// Proposed because the robot had lost its place.
+    Relocalisation,
+}
+
+/// How well the robot knows where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TrackState {
+    /// The map grows.
+    Mapping,
+    /// The map is kept, the robot found in it.
+    Localised,
+    /// The link to older places is broken.
+    Lost,
+}
+
+/// What became of a sentence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeardStatus {
+    /// It changed the map, or would have, were it not a repetition.
+    Understood,
+    /// Nothing changed.
+    NotUnderstood,
+    /// It was understood but can't be used (no place yet, unknown landmark).
+    Refused,
+}
+
+/// What became of a sentence, for the guide and for the report.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Heard {
+    /// The utterance's id.
+    pub id: String,
+    /// When it began.
+    pub stamp_ns: StampNs,
+    /// What was said.
+    pub text: String,
+    /// What became of it.
+    pub status: HeardStatus,
+    /// The analysis, in the notation of `language/parse.rs`; empty if there is none.
+    pub parse: String,
+    /// Where it was put in the best particle: place and probability, best first.
+    pub grounded: Vec<(PlaceId, f64)>,
+    /// In words, for the guide.
+    pub words: String,
+}
+
+/// One consequence of an event.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Effect {
+    /// A scan found its pose relative to a place; final (only the place still moves).
+    ScanPlaced {
+        /// Scans of this map so far, counted from 0 in the order of their events.
+        scan: u64,
+        /// The scan's stamp.
+        stamp_ns: StampNs,
+        /// The place held.
+        place: PlaceId,
+        /// The body in that place's frame.
+        place_from_body: Pose2,
+        /// Odometry at the scan.
+        odom_from_body: Pose2,
+    },
+    /// The robot's pose in the best particle, after every scan.
+    Tracked {
+        /// The scan's stamp.
+        stamp_ns: StampNs,
+        /// Pose in the map.
+        map_from_body: Pose2,
+        /// Correction of odometry (REP-105).
+        map_from_odom: Pose2,
+        /// Covariance of `map_from_body`.
+        covariance: Matrix3<f64>,
+        /// Whether to believe it.
+        state: TrackState,
+    },
+    /// A new place began.
+    PlaceBegan {
+        /// Its id.
+        place: PlaceId,
+        /// Stamp of its first scan.
+        stamp_ns: StampNs,
+    },
+    /// A scan was dropped, and why.
+    ScanDropped {
+        /// Its stamp.
+        stamp_ns: StampNs,
+        /// Why.
+        reason: String,
+    },
+    /// An edge entered the graph of `weight` of the posterior.
+    EdgeAccepted {
+        /// Older place.
+        i: PlaceId,
+        /// Newer place.
+        j: PlaceId,
+        /// How it was proposed.
+        kind: EdgeKind,
+        /// Posterior weight of the particles that took it.
+        weight: f64,
+        /// The figures behind it.
+        reason: String,
+    },
+    /// An edge was looked at and refused by every particle.
+    EdgeRefused {
+        /// Older place.
+        i: PlaceId,
+        /// Newer place.
+        j: PlaceId,
+        /// How it was proposed.
+        kind: EdgeKind,
+        /// "edge 41–7 refused: score .31 < .45".
+        reason: String,
+    },
+    /// A sentence was dealt with.
+    Heard(Heard),
+    /// Particles were resampled.
+    Resampled {
+        /// Effective sample size before.
+        effective_sample_size: f64,
+    },
+    /// The map's coordinates jumped: another particle is best now.
+    Jumped {
+        /// `epoch` after the jump.
+        epoch: u64,
+        /// New map frame from old, through the robot's current pose.
+        new_from_old: Pose2,
+    },
+    /// The robot's odometry jumped or restarted: a new segment began.
+    SegmentBegan {
+        /// Stamp of the first odometry of the segment.
+        stamp_ns: StampNs,
+        /// Why.
+        reason: String,
+    },
+}
