@@ -1,1 +1,5 @@
-//! client
+//! # toponym
+//!
+//! Client library of the toponym mapping server.
+
+pub mod sim;

@@ -1,0 +1,365 @@
+//! A simulator of buildings, robots and guides: whatever a real robot and a real guide send, with
+//! the truth beside it. Same scenario, same bytes.
+//!
+//! ```no_run
+//! let recording = toponym::sim::Scenario::demo(1).run()?;
+//! println!("{} messages", recording.messages.len());
+//! # Ok::<(), toponym::sim::SimError>(())
+//! ```
+
+pub mod args;
+mod building;
+pub mod geom;
+mod guide;
+mod laser;
+mod random;
+mod robot;
+mod world;
+pub mod write;
+
+pub use building::{OfficeStyle, demo_building, random_office};
+pub use guide::{GuideStyle, Sentence};
+pub use laser::LaserModel;
+pub use random::Draw;
+pub use robot::{Drive, Motion, Wheels};
+pub use world::{Plan, Room, RoomKind, World};
+
+use geom::Point;
+use toponym_proto::{Clock, Header, Message, Odom, Pose, Say, Scan, Setup, Stamp};
+
+/// A scenario that can't be played.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum SimError {
+    /// The tour names no room at all.
+    #[error("the tour is empty: give at least one room")]
+    NoTour,
+    /// The tour leads to a room that is not there.
+    #[error("the tour leads to room {0}, which the building does not have")]
+    NoSuchRoom(usize),
+    /// Two rooms are not joined by doors.
+    #[error("there is no way from room {0} to room {1}")]
+    NoWay(usize, usize),
+}
+
+/// Everything that a simulated tour depends on.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// The building.
+    pub world: World,
+    /// Rooms in the order of the tour, as indices into [`World::rooms`].
+    pub tour: Vec<usize>,
+    /// How the robot moves.
+    pub motion: Motion,
+    /// What its wheels get wrong.
+    pub wheels: Wheels,
+    /// Odometry messages per second.
+    pub odom_rate_hz: f64,
+    /// Its lasers.
+    pub lasers: Vec<LaserModel>,
+    /// What the guide says.
+    pub guide: GuideStyle,
+    /// Robot id in the messages.
+    pub robot: String,
+    /// Map id in the messages.
+    pub map: String,
+    /// Seed of every draw.
+    pub seed: u64,
+}
+
+impl Scenario {
+    /// The tour of the demo: round the building, back through the first lobby, and to the gym
+    /// again.
+    pub fn demo(seed: u64) -> Self {
+        let world = demo_building();
+        let stops = [
+            "elevator lobby",
+            "gym",
+            "kitchen",
+            "lecture hall",
+            "mail room",
+            "",
+            "cafe",
+            "library",
+            "workshop",
+            "elevator lobby",
+            "gym",
+            "kitchen",
+        ];
+        // The second lobby bears the first one's name: it is the last room so called.
+        let other_lobby = world.rooms.iter().rposition(|r| r.name == "elevator lobby");
+        let tour = stops
+            .iter()
+            .filter_map(|name| if name.is_empty() { other_lobby } else { world.room(name) })
+            .collect();
+        let mut scenario = Self::new(world, tour, seed);
+        scenario.motion.speed_mps = (0.8, 1.0);
+        scenario.guide = GuideStyle { named: 1.0, revisits: 1.0, foretold: 0.25, corridors: 0.0 };
+        scenario
+    }
+
+    /// A random office and a tour of `stops` rooms: mostly round in one direction, at times back
+    /// to where it was before.
+    pub fn office(style: &OfficeStyle, stops: usize, seed: u64) -> Self {
+        let world = random_office(style, seed);
+        let mut draw = Draw::new(seed, 2);
+        let mut order: Vec<usize> =
+            (0..world.rooms.len()).filter(|&k| world.rooms[k].kind == RoomKind::Room).collect();
+        let middle = centre(&world);
+        let bearing = |k: &usize| {
+            let [x, y] = world.rooms[*k].area.centre();
+            (y - middle[1]).atan2(x - middle[0])
+        };
+        order.sort_by(|a, b| bearing(a).total_cmp(&bearing(b)));
+        let mut tour: Vec<usize> = vec![0];
+        let mut next = draw.below(order.len());
+        while tour.len() < stops && !order.is_empty() {
+            if tour.len() > 4 && draw.chance(0.2) {
+                tour.push(tour[1 + draw.below(tour.len() - 3)]);
+            } else {
+                next += 1 + draw.below(2);
+                tour.push(order[next % order.len()]);
+            }
+        }
+        tour.dedup();
+        Self::new(world, tour, seed)
+    }
+
+    /// A tour of a building with every setting on its default.
+    pub fn new(world: World, tour: Vec<usize>, seed: u64) -> Self {
+        Self {
+            world,
+            tour,
+            motion: Motion::default(),
+            wheels: Wheels::default(),
+            odom_rate_hz: 10.0,
+            lasers: vec![LaserModel::default()],
+            guide: GuideStyle::default(),
+            robot: "sim".into(),
+            map: "main".into(),
+            seed,
+        }
+    }
+
+    /// Plays the scenario.
+    pub fn run(&self) -> Result<Recording, SimError> {
+        let draw = |purpose: u64| Draw::new(self.seed, 16 + purpose);
+        let drive = robot::drive(&self.world, &self.tour, &self.motion, &mut draw(0))?;
+        let odometry = drive.measured(&self.wheels, &mut draw(1));
+        let said = guide::narrate(&self.world, &drive, &self.guide, &mut draw(2));
+        let mut timed = vec![(0.0, self.setup())];
+        for t_s in ticks(drive.duration_s(), self.odom_rate_hz) {
+            timed.push((t_s, self.odom(t_s, &odometry)));
+        }
+        let mut scans = Vec::new();
+        for (laser, purpose) in self.lasers.iter().zip(3..) {
+            let mut draw = draw(purpose);
+            for t_s in ticks(drive.duration_s() - laser.sweep_s, laser.rate_hz) {
+                // A sweep is sent when it is complete.
+                timed.push((t_s + laser.sweep_s, self.scan(t_s, laser, &drive, &mut draw)));
+                scans.push((Stamp::from_seconds(t_s), drive.at(t_s)));
+            }
+        }
+        scans.sort_by_key(|s| s.0);
+        timed.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut messages: Vec<Message> = timed.into_iter().map(|(_, message)| message).collect();
+        number(&mut messages);
+        let messages = self.interleave(messages, &said);
+        let truth = Truth { scans, names: self.names(&said), start: drive.at(0.0), path_m: drive.path_m() };
+        Ok(Recording { messages, truth })
+    }
+
+    fn header(&self, t_s: f64) -> Header {
+        let stamp = Stamp::from_seconds(t_s);
+        Header { robot: self.robot.clone(), boot: 0, seq: 0, stamp, clock: Clock::Sim }
+    }
+
+    fn setup(&self) -> Message {
+        let lasers = self.lasers.iter().map(|l| l.mount.clone()).collect();
+        Message::Setup(Setup { header: self.header(0.0), map: self.map.clone(), lasers })
+    }
+
+    fn odom(&self, t_s: f64, odometry: &Drive) -> Message {
+        Message::Odom(Odom { header: self.header(t_s), odom_from_body: odometry.at(t_s) })
+    }
+
+    fn scan(&self, t_s: f64, laser: &LaserModel, drive: &Drive, draw: &mut Draw) -> Message {
+        Message::Scan(Scan {
+            header: self.header(t_s),
+            laser: laser.mount.id.clone(),
+            angle_min_rad: laser.angle_min_rad(),
+            angle_increment_rad: laser.angle_increment_rad(),
+            time_increment_s: laser.time_increment_s(),
+            ranges_m: laser.sweep(&self.world, drive, t_s, draw),
+        })
+    }
+
+    /// A sentence enters just before the first message of a later stamp.
+    fn interleave(&self, stream: Vec<Message>, said: &[Sentence]) -> Vec<Message> {
+        let mut messages = Vec::with_capacity(stream.len() + said.len());
+        let mut waiting = said.iter().enumerate().peekable();
+        for message in stream {
+            while let Some((k, s)) =
+                waiting.next_if(|(_, s)| stamp(&message) > Some(Stamp::from_seconds(s.began_s)))
+            {
+                messages.push(self.say(k, s));
+            }
+            messages.push(message);
+        }
+        messages.extend(waiting.map(|(k, s)| self.say(k, s)));
+        messages
+    }
+
+    fn say(&self, k: usize, sentence: &Sentence) -> Message {
+        let began = Stamp::from_seconds(sentence.began_s);
+        Message::Say(Say {
+            id: ulid::Ulid::from_parts((began.ns / 1_000_000) as u64, k as u128).to_string(),
+            robot: Some(self.robot.clone()),
+            text: sentence.text.clone(),
+            alternatives: Vec::new(),
+            lang: Some("en".into()),
+            speaker: Some("guide".into()),
+            began: Some(began),
+            ended: Some(Stamp::from_seconds(sentence.ended_s)),
+            retracts: None,
+        })
+    }
+
+    /// The rooms that were spoken of.
+    fn names(&self, said: &[Sentence]) -> Vec<(String, [Point; 4])> {
+        let spoken = |name: &str| said.iter().any(|s| s.text.contains(name));
+        let rooms = self.world.rooms.iter().filter(|r| spoken(&r.name));
+        rooms.map(|r| (r.name.clone(), r.area.corners())).collect()
+    }
+}
+
+/// What a scenario brought forth.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// All messages in the order in which a server gets them.
+    pub messages: Vec<Message>,
+    /// What really happened.
+    pub truth: Truth,
+}
+
+/// What really happened, world frame.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Truth {
+    /// The body's pose at each scan's stamp, in order of stamps.
+    pub scans: Vec<(Stamp, Pose)>,
+    /// Every name spoken, with the corners of each room that bears it, counter-clockwise.
+    pub names: Vec<(String, [Point; 4])>,
+    /// Pose at the start: the origin of the odometry frame.
+    pub start: Pose,
+    /// Way driven, metres.
+    pub path_m: f64,
+}
+
+fn ticks(duration_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
+    let n = if rate_hz > 0.0 && duration_s >= 0.0 { (duration_s * rate_hz) as usize + 1 } else { 0 };
+    (0..n).map(move |k| k as f64 / rate_hz)
+}
+
+fn centre(world: &World) -> Point {
+    let n = world.rooms.len().max(1) as f64;
+    let sum = world.rooms.iter().map(|r| r.area.centre()).fold([0.0, 0.0], |s, c| [s[0] + c[0], s[1] + c[1]]);
+    [sum[0] / n, sum[1] / n]
+}
+
+/// A robot's message has a header with its stamp; a sentence has none.
+fn header_mut(message: &mut Message) -> Option<&mut Header> {
+    match message {
+        Message::Setup(m) => Some(&mut m.header),
+        Message::Odom(m) => Some(&mut m.header),
+        Message::Scan(m) => Some(&mut m.header),
+        Message::Say(_) => None,
+    }
+}
+
+fn stamp(message: &Message) -> Option<Stamp> {
+    match message {
+        Message::Setup(m) => Some(m.header.stamp),
+        Message::Odom(m) => Some(m.header.stamp),
+        Message::Scan(m) => Some(m.header.stamp),
+        Message::Say(_) => None,
+    }
+}
+
+/// One counter over all streams of the robot.
+fn number(messages: &mut [Message]) {
+    for (header, seq) in messages.iter_mut().filter_map(header_mut).zip(0..) {
+        header.seq = seq;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn same_scenario_same_bytes_and_another_seed_others() {
+        let bytes = |seed| {
+            let mut scenario = Scenario::demo(seed);
+            scenario.tour.truncate(3);
+            format!("{:?}", scenario.run().unwrap().messages)
+        };
+        assert_eq!(bytes(1), bytes(1));
+        assert_ne!(bytes(1), bytes(2));
+    }
+
+    #[test]
+    fn the_demo_visits_every_room_and_comes_back() {
+        let recording = Scenario::demo(1).run().unwrap();
+        let names: Vec<&str> = recording.truth.names.iter().map(|n| n.0.as_str()).collect();
+        for name in ["gym", "kitchen", "library", "cafe", "lecture hall", "mail room", "workshop"] {
+            assert!(names.contains(&name), "{name} in {names:?}");
+        }
+        assert_eq!(names.iter().filter(|n| **n == "elevator lobby").count(), 2);
+        let path_m = recording.truth.path_m;
+        assert!((150.0..350.0).contains(&path_m), "{path_m} m");
+    }
+
+    #[test]
+    fn messages_are_numbered_and_sentences_stand_before_what_came_later() {
+        let recording = Scenario::office(&OfficeStyle::default(), 6, 5).run().unwrap();
+        let mut seq = 0;
+        let mut newest = None;
+        for (k, message) in recording.messages.iter().enumerate() {
+            if let Message::Say(say) = message {
+                assert!(newest <= say.began, "{say:?} comes too late");
+                let next = recording.messages[k + 1..].iter().find_map(stamp);
+                assert!(next.is_none_or(|n| Some(n) > say.began), "{say:?} comes too early");
+            } else {
+                let header = header_mut(&mut message.clone()).cloned().unwrap();
+                assert_eq!(header.seq, seq);
+                seq += 1;
+                newest = newest.max(stamp(message));
+            }
+        }
+        assert!(recording.messages.iter().any(|m| matches!(m, Message::Say(_))));
+    }
+
+    #[test]
+    fn a_swept_scan_comes_after_its_last_ray() {
+        let mut scenario = Scenario::demo(1);
+        scenario.tour.truncate(2);
+        scenario.lasers[0].sweep_s = 0.15;
+        let recording = scenario.run().unwrap();
+        let mut newest_odom = None;
+        for message in &recording.messages {
+            match message {
+                Message::Odom(o) => newest_odom = Some(o.header.stamp),
+                Message::Scan(s) => assert!(newest_odom >= Some(s.header.stamp), "{:?}", s.header),
+                _ => {}
+            }
+        }
+    }
+
+    #[test]
+    fn a_tour_to_nowhere_is_an_error() {
+        let mut scenario = Scenario::demo(1);
+        scenario.tour = vec![99];
+        assert_eq!(scenario.run().unwrap_err(), SimError::NoSuchRoom(99));
+        scenario.tour.clear();
+        assert_eq!(scenario.run().unwrap_err(), SimError::NoTour);
+    }
+}

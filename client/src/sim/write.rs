@@ -1,0 +1,147 @@
+//! A recording as files: a CARMEN log, a narration, and the truth to score against.
+
+use super::Recording;
+use serde_json::{Value, json};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::io;
+use std::path::Path;
+use toponym_proto::{Message, Scan};
+
+/// What CARMEN logs write where nothing was seen.
+const NOTHING_SEEN_M: f32 = 81.83;
+
+/// Writes `sim.clf`, `narration.jsonl`, `truth.json` and `questions.json` into a folder, which it
+/// makes if need be.
+pub fn write_folder(recording: &Recording, folder: &Path) -> io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    std::fs::write(folder.join("sim.clf"), carmen(recording))?;
+    std::fs::write(folder.join("narration.jsonl"), narration(recording))?;
+    let (truth, questions) = truth(recording);
+    std::fs::write(folder.join("truth.json"), format!("{truth}\n"))?;
+    std::fs::write(folder.join("questions.json"), format!("{questions:#}\n"))
+}
+
+/// The robot's streams as a CARMEN log (ODOM and FLASER lines). The format knows one laser, flat
+/// ahead on the body's x axis, seeing at once: of others, only what it can say is written.
+pub fn carmen(recording: &Recording) -> String {
+    let mut text = String::from("# simulated by toponym\n");
+    let (mut offset_m, mut front) = (0.0, None);
+    let mut odom = toponym_proto::Pose::default();
+    for message in &recording.messages {
+        match message {
+            Message::Setup(setup) => {
+                if let Some(laser) = setup.lasers.first() {
+                    offset_m = laser.x_m;
+                    front = Some(laser.id.clone());
+                    // Writing to a string cannot fail.
+                    let _ = writeln!(text, "PARAM robot_frontlaser_offset {offset_m}");
+                }
+            }
+            Message::Odom(m) => {
+                odom = m.odom_from_body;
+                let t = m.header.stamp.seconds();
+                let (x, y, yaw) = (odom.x_m, odom.y_m, odom.yaw_rad);
+                let _ = writeln!(text, "ODOM {x} {y} {yaw} 0 0 0 {t:.6} sim {t:.6}");
+            }
+            Message::Scan(scan) if front.as_ref() == Some(&scan.laser) => {
+                flaser(&mut text, scan, &odom, offset_m);
+            }
+            Message::Scan(_) | Message::Say(_) => {}
+        }
+    }
+    text
+}
+
+fn flaser(text: &mut String, scan: &Scan, odom: &toponym_proto::Pose, offset_m: f64) {
+    let _ = write!(text, "FLASER {}", scan.ranges_m.len());
+    for &range_m in &scan.ranges_m {
+        let range_m = match range_m {
+            r if r.is_nan() => 0.0,
+            r if r.is_infinite() => NOTHING_SEEN_M,
+            r => r,
+        };
+        let _ = write!(text, " {range_m}");
+    }
+    let [laser_x, laser_y] = super::geom::apply(odom, [offset_m, 0.0]);
+    let (x, y, yaw) = (odom.x_m, odom.y_m, odom.yaw_rad);
+    let t = scan.header.stamp.seconds();
+    let _ = writeln!(text, " {laser_x} {laser_y} {yaw} {x} {y} {yaw} {t:.6} sim {t:.6}");
+}
+
+/// The sentences, one JSON object a line; `t` is the log's own stamp.
+pub fn narration(recording: &Recording) -> String {
+    let mut text = String::new();
+    for message in &recording.messages {
+        if let Message::Say(say) = message {
+            let t = say.began.map(toponym_proto::Stamp::seconds);
+            let _ = writeln!(text, "{}", json!({"t": t, "id": say.id, "text": say.text}));
+        }
+    }
+    text
+}
+
+/// The truth (`trajectory` rows `[t, x, y, yaw]`, `regions` by id with their corners) and the
+/// questions that have an answer, each with the regions that are right.
+pub fn truth(recording: &Recording) -> (Value, Value) {
+    let trajectory: Vec<[f64; 4]> =
+        recording.truth.scans.iter().map(|(stamp, p)| [stamp.seconds(), p.x_m, p.y_m, p.yaw_rad]).collect();
+    let mut regions = BTreeMap::new();
+    let mut questions: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for (k, (name, corners)) in recording.truth.names.iter().enumerate() {
+        let id = format!("R{}", k + 1);
+        questions.entry(format!("where is the {name}")).or_default().push(id.clone());
+        regions.insert(id, corners);
+    }
+    let truth = json!({"trajectory": trajectory, "regions": regions, "path_m": recording.truth.path_m});
+    (truth, json!(questions))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::sim::Scenario;
+
+    fn recording() -> Recording {
+        let mut scenario = Scenario::demo(1);
+        scenario.tour.truncate(2);
+        scenario.run().unwrap()
+    }
+
+    #[test]
+    fn the_log_has_a_line_per_message_and_the_stamp_before_the_host() {
+        let recording = recording();
+        let text = carmen(&recording);
+        let count = |word: &str| text.lines().filter(|l| l.starts_with(word)).count();
+        let scans = recording.messages.iter().filter(|m| matches!(m, Message::Scan(_))).count();
+        let odoms = recording.messages.iter().filter(|m| matches!(m, Message::Odom(_))).count();
+        assert_eq!((count("FLASER 181 "), count("ODOM ")), (scans, odoms));
+        for line in text.lines().filter(|l| l.starts_with("FLASER")) {
+            let fields: Vec<&str> = line.split_whitespace().collect();
+            assert_eq!(fields.len(), 2 + 181 + 6 + 3);
+            assert_eq!(fields[190], "sim");
+            assert!(fields[189].parse::<f64>().is_ok());
+        }
+    }
+
+    #[test]
+    fn every_question_has_a_region_that_exists() {
+        let (truth, questions) = truth(&recording());
+        let questions = questions.as_object().unwrap();
+        assert!(questions.contains_key("where is the gym"), "{questions:?}");
+        for ids in questions.values() {
+            for id in ids.as_array().unwrap() {
+                assert!(truth["regions"][id.as_str().unwrap()].is_array());
+            }
+        }
+    }
+
+    #[test]
+    fn each_sentence_is_a_line() {
+        let recording = recording();
+        let lines: Vec<Value> =
+            narration(&recording).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+        assert!(!lines.is_empty());
+        assert!(lines.iter().all(|l| l["t"].is_f64() && l["text"].is_string()));
+    }
+}
