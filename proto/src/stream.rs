@@ -1,61 +1,9 @@
 //! What robots and guides send.
 
-use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use crate::wire::{self, with_header};
+use serde::{Deserialize, Serialize};
 
-/// A time: nanoseconds, on the wire `{"sec", "nanosec"}` in JSON and a bare i64 in bincode.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct Stamp {
-    /// Nanoseconds since the clock's own zero.
-    pub ns: i64,
-}
-
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct RosTime {
-    sec: i64,
-    nanosec: u32,
-}
-
-impl Stamp {
-    /// From seconds; rounds to nanoseconds.
-    pub fn from_seconds(s: f64) -> Self {
-        let whole = s.floor();
-        Self { ns: whole as i64 * 1_000_000_000 + ((s - whole) * 1e9).round() as i64 }
-    }
-
-    /// Seconds.
-    pub fn seconds(self) -> f64 {
-        self.ns.div_euclid(1_000_000_000) as f64 + self.ns.rem_euclid(1_000_000_000) as f64 * 1e-9
-    }
-}
-
-impl Serialize for Stamp {
-    fn serialize<S: Serializer>(&self, s: S) -> Result<S::Ok, S::Error> {
-        if s.is_human_readable() {
-            RosTime {
-                sec: self.ns.div_euclid(1_000_000_000),
-                nanosec: self.ns.rem_euclid(1_000_000_000) as u32,
-            }
-            .serialize(s)
-        } else {
-            self.ns.serialize(s)
-        }
-    }
-}
-
-impl<'de> Deserialize<'de> for Stamp {
-    fn deserialize<D: Deserializer<'de>>(d: D) -> Result<Self, D::Error> {
-        if !d.is_human_readable() {
-            return Ok(Self { ns: i64::deserialize(d)? });
-        }
-        let t = RosTime::deserialize(d)?;
-        t.sec
-            .checked_mul(1_000_000_000)
-            .and_then(|s| s.checked_add(i64::from(t.nanosec)))
-            .map(|ns| Self { ns })
-            .ok_or_else(|| serde::de::Error::custom(format!("sec {} is out of range", t.sec)))
-    }
-}
+pub use crate::wire::Stamp;
 
 /// Which clock stamped a message.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -70,24 +18,25 @@ pub enum Clock {
     Log,
 }
 
-/// What every message of a robot's streams begins with.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+/// What every message of a robot's streams begins with; on the wire its fields stand beside the
+/// message's own.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Header {
     /// Robot id, `[a-z0-9][a-z0-9_-]{0,62}`.
     pub robot: String,
-    /// Counts the robot's restarts.
+    /// Grows with the robot's restarts: a counter, or the Unix time of the start in seconds.
     pub boot: u64,
     /// One counter per robot and boot over all its streams, from 0.
     pub seq: u64,
     /// When it was measured.
     pub stamp: Stamp,
     /// By which clock.
-    #[serde(default)]
     pub clock: Clock,
 }
 
 /// A pose in the plane, REP-103.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Pose {
     /// Metres.
     pub x_m: f64,
@@ -99,6 +48,7 @@ pub struct Pose {
 
 /// A laser and how it is mounted on the body.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Laser {
     /// Laser id.
     pub id: String,
@@ -123,50 +73,50 @@ pub struct Laser {
     pub ignored_rad: Vec<(f64, f64)>,
 }
 
-/// A robot presents itself.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Setup {
-    /// Who, when, in which order.
-    #[serde(flatten)]
-    pub header: Header,
-    /// The map its streams belong to.
-    pub map: String,
-    /// Its lasers.
-    pub lasers: Vec<Laser>,
+with_header! {
+    /// A robot presents itself.
+    Setup {
+        /// The map its streams belong to.
+        map: String,
+        /// Its lasers.
+        lasers: Vec<Laser>,
+    }
 }
 
-/// Wheel odometry.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Odom {
-    /// Who, when, in which order.
-    #[serde(flatten)]
-    pub header: Header,
-    /// Pose of the body in the odometry frame.
-    pub odom_from_body: Pose,
+with_header! {
+    /// Wheel odometry.
+    Odom {
+        /// Pose of the body in the odometry frame.
+        odom_from_body: Pose,
+    }
 }
 
-/// One sweep of a laser; ranges: JSON `null` or NaN no information, `+inf` (JSON: any number at
-/// or above the laser's maximum) nothing seen.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Scan {
-    /// Who, when (the first ray), in which order.
-    #[serde(flatten)]
-    pub header: Header,
-    /// Which of the setup's lasers.
-    pub laser: String,
-    /// Bearing of the first ray.
-    pub angle_min_rad: f64,
-    /// From ray to ray; may be negative.
-    pub angle_increment_rad: f64,
-    /// From ray to ray; 0: all at once.
-    #[serde(default)]
-    pub time_increment_s: f64,
-    /// Metres.
-    pub ranges_m: Vec<f32>,
+with_header! {
+    /// One sweep of a laser; ranges: JSON `null` or NaN no information, `+inf` (JSON: any number
+    /// at or above the laser's maximum) nothing seen. The header's stamp is the first ray's.
+    Scan {
+        /// Which of the setup's lasers.
+        laser: String,
+        /// Bearing of the first ray.
+        angle_min_rad: f64,
+        /// From ray to ray; may be negative.
+        angle_increment_rad: f64,
+        /// From ray to ray; 0: all at once.
+        time_increment_s: f64 [serde(default)],
+        /// Metres.
+        ranges_m: Vec<f32> [serde(with = "wire::ranges")],
+    }
+}
+
+with_header! {
+    /// The robot's stream ends here: nothing is waited for any more, the map settles. The stream
+    /// may go on afterwards.
+    End {}
 }
 
 /// A guide's sentence.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Say {
     /// ULID; makes a resend harmless.
     pub id: String,
@@ -184,7 +134,8 @@ pub struct Say {
     /// Who said it.
     #[serde(default)]
     pub speaker: Option<String>,
-    /// When it began; the time of arrival if left out.
+    /// When it began, on the clock of the robot's stream; left out: the newest stamp of that
+    /// stream when the sentence arrives.
     #[serde(default)]
     pub began: Option<Stamp>,
     /// When it ended.
@@ -197,6 +148,7 @@ pub struct Say {
 
 /// A recogniser's other guess.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Hearing {
     /// What it may have been.
     pub text: String,
@@ -216,4 +168,19 @@ pub enum Message {
     Scan(Scan),
     /// A sentence.
     Say(Say),
+    /// The robot's stream ends.
+    End(End),
+}
+
+impl Message {
+    /// The header of a robot's message; a sentence has none.
+    pub fn header(&self) -> Option<&Header> {
+        match self {
+            Self::Setup(m) => Some(&m.header),
+            Self::Odom(m) => Some(&m.header),
+            Self::Scan(m) => Some(&m.header),
+            Self::End(m) => Some(&m.header),
+            Self::Say(_) => None,
+        }
+    }
 }

@@ -1,0 +1,303 @@
+//! Where sentences enter a robot's stream: the ordering rule that makes a networked run equal the
+//! offline one.
+//!
+//! > A sentence enters just before the first message of the robot's stream whose stamp is later
+//! > than the sentence's `began`; sentences that enter at one place do so in the order of `began`,
+//! > then `id`; those that nothing is later than enter at the end, before [`crate::End`].
+//!
+//! Stamps of a log may repeat or step back; the rule does not mind. Offline, [`Sentences`] is all
+//! that is needed; online, [`HoldBack`] keeps the stream back for a while, so that a sentence that
+//! arrives over another connection still finds its place.
+
+use crate::stream::{Message, Say, Stamp};
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+/// Stamp by which the rule places sentences round a message; the end of a stream comes after all.
+pub fn order_stamp(message: &Message) -> Stamp {
+    match message {
+        Message::End(_) => Stamp { ns: i64::MAX },
+        Message::Say(say) => say.began.unwrap_or_default(),
+        Message::Setup(m) => m.header.stamp,
+        Message::Odom(m) => m.header.stamp,
+        Message::Scan(m) => m.header.stamp,
+    }
+}
+
+/// Sentences that have not entered the stream yet, in the order of the rule.
+#[derive(Debug, Default)]
+pub struct Sentences {
+    waiting: BTreeMap<(Stamp, String), Say>,
+}
+
+impl Sentences {
+    /// Adds one; without `began` it counts as said at `now`.
+    pub fn push(&mut self, mut say: Say, now: Stamp) {
+        let began = *say.began.get_or_insert(now);
+        self.waiting.insert((began, say.id.clone()), say);
+    }
+
+    /// Takes the next that enters before a message with this stamp ([`order_stamp`]); call it
+    /// until there is none, then let the message enter.
+    pub fn pop_before(&mut self, stamp: Stamp) -> Option<Say> {
+        let first = self.waiting.first_entry()?;
+        (first.key().0 < stamp).then(|| first.remove())
+    }
+
+    /// Takes the next at the end of the stream.
+    pub fn pop(&mut self) -> Option<Say> {
+        self.waiting.pop_first().map(|(_, say)| say)
+    }
+
+    /// How many wait.
+    pub fn len(&self) -> usize {
+        self.waiting.len()
+    }
+
+    /// Whether none waits.
+    pub fn is_empty(&self) -> bool {
+        self.waiting.is_empty()
+    }
+}
+
+/// Keeps a robot's stream back by a fixed time after arrival and lets sentences in where the rule
+/// wants them. A sentence whose place has passed enters at once.
+///
+/// Time is passed in: seconds on any clock that never steps back.
+#[derive(Debug)]
+pub struct HoldBack {
+    /// How long a message waits for sentences.
+    hold: Duration,
+    /// The stream, each message with its time of arrival.
+    held: VecDeque<(Duration, Message)>,
+    sentences: Sentences,
+    /// When the last sentence arrived: one that nothing in the stream is later than waits
+    /// [`HoldBack::PATIENCE`] holds for the stream to go on.
+    last_sentence: Duration,
+    /// Newest stamp that arrived.
+    newest: Stamp,
+    /// Newest stamp that went out.
+    passed: Option<Stamp>,
+}
+
+impl HoldBack {
+    /// Holds that a sentence ahead of its stream waits for the stream to catch up.
+    pub const PATIENCE: u32 = 10;
+
+    /// With nothing in it.
+    pub fn new(hold: Duration) -> Self {
+        Self {
+            hold,
+            held: VecDeque::new(),
+            sentences: Sentences::default(),
+            last_sentence: Duration::ZERO,
+            newest: Stamp { ns: i64::MIN },
+            passed: None,
+        }
+    }
+
+    /// Takes in the stream's next message, in the order of `seq`.
+    pub fn push(&mut self, now: Duration, message: Message) {
+        if let Some(header) = message.header() {
+            self.newest = self.newest.max(header.stamp);
+        }
+        self.held.push_back((now, message));
+    }
+
+    /// Takes in a sentence.
+    pub fn push_say(&mut self, now: Duration, say: Say) {
+        let stream_now = if self.newest.ns == i64::MIN { Stamp::default() } else { self.newest };
+        self.sentences.push(say, stream_now);
+        self.last_sentence = now;
+    }
+
+    /// How many messages are held.
+    pub fn len(&self) -> usize {
+        self.held.len() + self.sentences.len()
+    }
+
+    /// Whether nothing is held.
+    pub fn is_empty(&self) -> bool {
+        self.held.is_empty() && self.sentences.is_empty()
+    }
+
+    /// Takes the next message that is due at `now`; [`Duration::MAX`] takes all.
+    pub fn pop(&mut self, now: Duration) -> Option<Message> {
+        // A sentence whose place has passed gains nothing by waiting.
+        if let Some(say) = self.passed.and_then(|passed| self.sentences.pop_before(passed)) {
+            return Some(Message::Say(say));
+        }
+        let Some((arrived, message)) = self.held.front() else {
+            let waited = now.saturating_sub(self.last_sentence);
+            return (waited >= self.hold * Self::PATIENCE).then(|| self.sentences.pop())?.map(Message::Say);
+        };
+        if now.saturating_sub(*arrived) < self.hold {
+            return None;
+        }
+        let stamp = order_stamp(message);
+        if let Some(say) = self.sentences.pop_before(stamp) {
+            return Some(Message::Say(say));
+        }
+        let (_, message) = self.held.pop_front()?;
+        // The end of a stream is no time: what is said later still waits for the stream to go on.
+        if !matches!(message, Message::End(_)) {
+            self.passed = self.passed.max(Some(stamp));
+        }
+        Some(message)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::{End, Header, Odom, Pose};
+    use proptest::prelude::*;
+
+    const HOLD: Duration = Duration::from_millis(500);
+
+    fn odom(seq: u64, ns: i64) -> Message {
+        let header = Header { robot: "r1".into(), seq, stamp: Stamp { ns }, ..Default::default() };
+        Message::Odom(Odom { header, odom_from_body: Pose::default() })
+    }
+
+    fn say(id: usize, ns: i64) -> Say {
+        Say { id: format!("s{id}"), text: "gym".into(), began: Some(Stamp { ns }), ..Default::default() }
+    }
+
+    /// The rule, word by word.
+    fn by_the_rule(stream: &[Message], mut says: Vec<Say>) -> Vec<Message> {
+        says.sort_by_key(|s| (s.began, s.id.clone()));
+        let mut slots: Vec<Vec<Message>> = vec![Vec::new(); stream.len() + 1];
+        for say in says {
+            let slot = stream.iter().position(|m| Some(order_stamp(m)) > say.began).unwrap_or(stream.len());
+            slots[slot].push(Message::Say(say));
+        }
+        let mut all = slots.remove(0);
+        for (m, slot) in stream.iter().zip(slots) {
+            all.push(m.clone());
+            all.extend(slot);
+        }
+        all
+    }
+
+    fn offline(stream: &[Message], says: Vec<Say>) -> Vec<Message> {
+        let mut sentences = Sentences::default();
+        says.into_iter().for_each(|s| sentences.push(s, Stamp::default()));
+        let mut all = Vec::new();
+        for m in stream {
+            while let Some(s) = sentences.pop_before(order_stamp(m)) {
+                all.push(Message::Say(s));
+            }
+            all.push(m.clone());
+        }
+        while let Some(s) = sentences.pop() {
+            all.push(Message::Say(s));
+        }
+        all
+    }
+
+    fn drain(hold: &mut HoldBack, now: Duration, into: &mut Vec<Message>) {
+        while let Some(m) = hold.pop(now) {
+            into.push(m);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn offline_follows_the_rule(
+            stamps in prop::collection::vec(0..30_i64, 0..20),
+            begans in prop::collection::vec(-3..33_i64, 0..8),
+        ) {
+            let stream: Vec<_> = stamps.iter().enumerate().map(|(i, s)| odom(i as u64, *s)).collect();
+            let says: Vec<_> = begans.iter().enumerate().map(|(i, b)| say(i, *b)).collect();
+            prop_assert_eq!(offline(&stream, says.clone()), by_the_rule(&stream, says));
+        }
+
+        /// Each sentence arrives anywhere from before its place up to a hold after it: the
+        /// networked order is the offline one.
+        #[test]
+        fn online_equals_offline_within_the_hold(
+            steps in prop::collection::vec((-2..5_i64, 0..400_u64), 1..30),
+            begans in prop::collection::vec((0.0..1.0_f64, -400..499_i64), 0..6),
+        ) {
+            let (mut stamp, mut clock_ms) = (0, 1000);
+            let mut arrivals = Vec::new();
+            for (i, (ds, dt)) in steps.iter().enumerate() {
+                (stamp, clock_ms) = (stamp + ds, clock_ms + dt);
+                arrivals.push((clock_ms, odom(i as u64, stamp)));
+            }
+            let end = Header { robot: "r1".into(), seq: 99, ..Default::default() };
+            arrivals.push((clock_ms + 400, Message::End(End { header: end })));
+            let stream: Vec<_> = arrivals.iter().map(|a| a.1.clone()).collect();
+            let says: Vec<_> = begans.iter().enumerate().map(|(i, (share, _))| say(i, (share * stamp as f64) as i64)).collect();
+            // The message before which a sentence enters, and its arrival there.
+            let mut all: Vec<(u64, usize, Message)> = arrivals.iter().cloned().enumerate().map(|(i, (t, m))| (t, i, m)).collect();
+            for (s, (_, late_ms)) in says.iter().zip(&begans) {
+                let slot = stream.iter().position(|m| Some(order_stamp(m)) > s.began).unwrap();
+                let at = arrivals[slot].0.saturating_add_signed(*late_ms);
+                all.push((at, usize::MAX, Message::Say(s.clone())));
+            }
+            all.sort_by_key(|(t, i, _)| (*t, *i));
+            let (mut hold, mut got) = (HoldBack::new(HOLD), Vec::new());
+            for (t, _, m) in all {
+                let now = Duration::from_millis(t);
+                match m {
+                    Message::Say(s) => hold.push_say(now, s),
+                    m => hold.push(now, m),
+                }
+                drain(&mut hold, now, &mut got);
+            }
+            drain(&mut hold, Duration::MAX, &mut got);
+            prop_assert_eq!(got, offline(&stream, says));
+        }
+    }
+
+    #[test]
+    fn a_message_is_held_and_then_let_go() {
+        let mut hold = HoldBack::new(HOLD);
+        hold.push(Duration::from_secs(1), odom(0, 5));
+        assert_eq!(hold.pop(Duration::from_millis(1499)), None);
+        assert_eq!(hold.pop(Duration::from_millis(1500)), Some(odom(0, 5)));
+        assert!(hold.is_empty());
+    }
+
+    #[test]
+    fn a_late_sentence_enters_at_once() {
+        let mut hold = HoldBack::new(HOLD);
+        hold.push(Duration::ZERO, odom(0, 5));
+        assert!(hold.pop(HOLD).is_some());
+        hold.push(HOLD, odom(1, 6));
+        hold.push_say(HOLD, say(0, 4));
+        assert_eq!(hold.pop(HOLD), Some(Message::Say(say(0, 4))));
+    }
+
+    #[test]
+    fn a_sentence_ahead_of_a_silent_stream_enters_in_the_end() {
+        let mut hold = HoldBack::new(HOLD);
+        hold.push_say(Duration::ZERO, say(0, 100));
+        assert_eq!(hold.pop(HOLD), None);
+        assert_eq!(hold.pop(HOLD * HoldBack::PATIENCE), Some(Message::Say(say(0, 100))));
+    }
+
+    #[test]
+    fn a_sentence_without_a_time_is_said_now() {
+        let mut hold = HoldBack::new(HOLD);
+        hold.push(Duration::ZERO, odom(0, 7));
+        hold.push_say(Duration::ZERO, Say { began: None, ..say(0, 0) });
+        let mut got = Vec::new();
+        drain(&mut hold, Duration::MAX, &mut got);
+        assert_eq!(got, [odom(0, 7), Message::Say(say(0, 7))]);
+    }
+
+    #[test]
+    fn the_end_comes_after_all_that_was_said() {
+        let end = || Message::End(End { header: Header { robot: "r1".into(), ..Default::default() } });
+        let mut hold = HoldBack::new(HOLD);
+        hold.push(Duration::ZERO, odom(0, 7));
+        hold.push(Duration::ZERO, end());
+        hold.push_say(Duration::ZERO, say(0, 1_000_000));
+        let mut got = Vec::new();
+        drain(&mut hold, HOLD, &mut got);
+        assert_eq!(got, [odom(0, 7), Message::Say(say(0, 1_000_000)), end()]);
+    }
+}

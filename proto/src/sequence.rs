@@ -1,0 +1,232 @@
+//! One robot's streams put into one order, by (boot, seq).
+
+use crate::stream::{Header, Message};
+use std::collections::{BTreeMap, VecDeque};
+use std::time::Duration;
+
+/// What comes next.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Step {
+    /// The next message.
+    Message(Message),
+    /// Messages that did not come in time; they are given up.
+    Lost {
+        /// Of this boot.
+        boot: u64,
+        /// First missing seq.
+        from: u64,
+        /// First seq that is there again.
+        to: u64,
+    },
+}
+
+/// What was dropped, and why.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Dropped {
+    /// Messages whose seq had come already, or was given up.
+    pub repeated: u64,
+    /// Messages of a boot before the newest.
+    pub stale: u64,
+}
+
+/// Orders the messages of one robot. A gap is waited for, but neither longer than `gap_wait` nor
+/// over more than `window` later messages. Time is passed in, as in [`crate::merge::HoldBack`].
+#[derive(Debug)]
+pub struct Sequencer {
+    gap_wait: Duration,
+    window: usize,
+    boot: Option<u64>,
+    /// Seq that comes next.
+    next: u64,
+    /// Came too early, each with its time of arrival.
+    early: BTreeMap<u64, (Duration, Message)>,
+    /// In order, not yet taken.
+    ready: VecDeque<Step>,
+    dropped: Dropped,
+}
+
+impl Sequencer {
+    /// `watermark`: (boot, seq) of the last message of an earlier run; all up to it are known.
+    pub fn new(gap_wait: Duration, window: usize, watermark: Option<(u64, u64)>) -> Self {
+        Self {
+            gap_wait,
+            window,
+            boot: watermark.map(|(boot, _)| boot),
+            next: watermark.map_or(0, |(_, seq)| seq + 1),
+            early: BTreeMap::new(),
+            ready: VecDeque::new(),
+            dropped: Dropped::default(),
+        }
+    }
+
+    /// Takes in a message; one without a header is none of a robot's.
+    pub fn push(&mut self, now: Duration, message: Message) {
+        let Some(&Header { boot, seq, .. }) = message.header() else {
+            return;
+        };
+        match self.boot {
+            Some(current) if boot < current => {
+                self.dropped.stale += 1;
+                return;
+            }
+            Some(current) if boot == current => {}
+            _ => {
+                // Nothing more comes of the boot before.
+                self.give_up(Duration::MAX);
+                (self.boot, self.next) = (Some(boot), 0);
+            }
+        }
+        if seq < self.next || self.early.contains_key(&seq) {
+            self.dropped.repeated += 1;
+            return;
+        }
+        self.early.insert(seq, (now, message));
+        self.take_ready();
+    }
+
+    /// The next step that is due at `now`; [`Duration::MAX`] gives up all gaps.
+    pub fn pop(&mut self, now: Duration) -> Option<Step> {
+        if self.ready.is_empty() {
+            self.give_up(now);
+        }
+        self.ready.pop_front()
+    }
+
+    /// What was dropped so far.
+    pub fn dropped(&self) -> Dropped {
+        self.dropped
+    }
+
+    /// Messages that are held.
+    pub fn len(&self) -> usize {
+        self.early.len() + self.ready.len()
+    }
+
+    /// Whether nothing is held.
+    pub fn is_empty(&self) -> bool {
+        self.early.is_empty() && self.ready.is_empty()
+    }
+
+    fn take_ready(&mut self) {
+        while let Some((_, message)) = self.early.remove(&self.next) {
+            self.ready.push_back(Step::Message(message));
+            self.next += 1;
+        }
+    }
+
+    /// Gives up gaps that were waited for long enough, the earliest first.
+    fn give_up(&mut self, now: Duration) {
+        while let Some((&first, _)) = self.early.first_key_value() {
+            // The oldest of those behind the gap has waited longest, wherever it stands.
+            let oldest = self.early.values().map(|(arrived, _)| *arrived).min().unwrap_or(now);
+            if self.early.len() <= self.window && now.saturating_sub(oldest) < self.gap_wait {
+                return;
+            }
+            let boot = self.boot.unwrap_or_default();
+            self.ready.push_back(Step::Lost { boot, from: self.next, to: first });
+            self.next = first;
+            self.take_ready();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::{Odom, Pose};
+    use proptest::prelude::*;
+
+    const WAIT: Duration = Duration::from_secs(1);
+
+    fn odom(boot: u64, seq: u64) -> Message {
+        let header = Header { robot: "r1".into(), boot, seq, ..Default::default() };
+        Message::Odom(Odom { header, odom_from_body: Pose::default() })
+    }
+
+    fn drain(s: &mut Sequencer, now: Duration) -> Vec<Step> {
+        std::iter::from_fn(|| s.pop(now)).collect()
+    }
+
+    fn messages(boot: u64, seqs: impl IntoIterator<Item = u64>) -> Vec<Step> {
+        seqs.into_iter().map(|seq| Step::Message(odom(boot, seq))).collect()
+    }
+
+    proptest! {
+        #[test]
+        fn any_order_with_repetitions_comes_out_in_order(
+            order in Just((0..40_u64).collect::<Vec<_>>()).prop_shuffle(),
+            again in prop::collection::vec(0..40_usize, 0..20),
+        ) {
+            let mut s = Sequencer::new(WAIT, 100, None);
+            let mut got = Vec::new();
+            for &seq in order.iter().chain(again.iter().map(|i| &order[*i])) {
+                s.push(Duration::ZERO, odom(0, seq));
+                got.extend(drain(&mut s, Duration::ZERO));
+            }
+            prop_assert_eq!(got, messages(0, 0..40));
+            prop_assert_eq!(s.dropped().repeated, again.len() as u64);
+        }
+
+        #[test]
+        fn what_is_missing_is_told_once(present in prop::collection::btree_set(0..60_u64, 1..40)) {
+            let mut s = Sequencer::new(WAIT, 100, None);
+            present.iter().for_each(|seq| s.push(Duration::ZERO, odom(0, *seq)));
+            let (mut seen, mut lost) = (Vec::new(), Vec::new());
+            for step in drain(&mut s, WAIT) {
+                match step {
+                    Step::Message(m) => seen.extend(m.header().map(|h| h.seq)),
+                    Step::Lost { from, to, .. } => lost.extend(from..to),
+                }
+            }
+            let last = *present.last().unwrap();
+            prop_assert_eq!(seen, present.iter().copied().collect::<Vec<_>>());
+            prop_assert_eq!(lost, (0..last).filter(|i| !present.contains(i)).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn a_gap_is_waited_for_but_not_for_ever() {
+        let mut s = Sequencer::new(WAIT, 100, None);
+        s.push(Duration::ZERO, odom(0, 0));
+        s.push(Duration::ZERO, odom(0, 2));
+        assert_eq!(drain(&mut s, Duration::from_millis(999)), messages(0, [0]));
+        let lost = Step::Lost { boot: 0, from: 1, to: 2 };
+        assert_eq!(drain(&mut s, WAIT), [vec![lost], messages(0, [2])].concat());
+        // It comes after all: too late.
+        s.push(WAIT, odom(0, 1));
+        assert_eq!((s.pop(WAIT), s.dropped().repeated), (None, 1));
+    }
+
+    #[test]
+    fn a_full_window_ends_the_wait() {
+        let mut s = Sequencer::new(WAIT, 3, None);
+        for seq in 1..=4 {
+            s.push(Duration::ZERO, odom(0, seq));
+        }
+        assert_eq!(s.pop(Duration::ZERO), Some(Step::Lost { boot: 0, from: 0, to: 1 }));
+        assert_eq!(drain(&mut s, Duration::ZERO), messages(0, 1..=4));
+    }
+
+    #[test]
+    fn a_new_boot_ends_the_old_one() {
+        let mut s = Sequencer::new(WAIT, 100, None);
+        s.push(Duration::ZERO, odom(5, 0));
+        s.push(Duration::ZERO, odom(5, 2));
+        s.push(Duration::ZERO, odom(6, 0));
+        s.push(Duration::ZERO, odom(5, 3));
+        let lost = vec![Step::Lost { boot: 5, from: 1, to: 2 }];
+        let want = [messages(5, [0]), lost, messages(5, [2]), messages(6, [0])].concat();
+        assert_eq!(drain(&mut s, Duration::ZERO), want);
+        assert_eq!(s.dropped().stale, 1);
+    }
+
+    #[test]
+    fn an_earlier_run_is_gone_on_with() {
+        let mut s = Sequencer::new(WAIT, 100, Some((5, 7)));
+        for seq in 6..10 {
+            s.push(Duration::ZERO, odom(5, seq));
+        }
+        assert_eq!(drain(&mut s, Duration::ZERO), messages(5, [8, 9]));
+        assert_eq!(s.dropped().repeated, 2);
+    }
+}

@@ -1,0 +1,326 @@
+//! Limits, and the only place that rejects.
+
+use crate::keys::{ANY_ROBOT, check_id};
+use crate::stream::{Header, Laser, Message, Pose, Say, Scan, Setup};
+use serde::{Deserialize, Serialize};
+
+/// Why a value is refused.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+#[error("{field}: {reason}")]
+pub struct Invalid {
+    /// Name of the field, as in `PROTOCOL.md`.
+    pub field: String,
+    /// The bad value and what it should be.
+    pub reason: String,
+}
+
+impl Invalid {
+    /// A refusal.
+    pub fn new(field: &str, reason: impl Into<String>) -> Self {
+        Self { field: field.into(), reason: reason.into() }
+    }
+}
+
+/// Upper bounds of what is taken in.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct Limits {
+    /// Bytes of one message.
+    pub payload_bytes: usize,
+    /// Rays of one sweep.
+    pub beams: usize,
+    /// Lasers of one robot.
+    pub lasers: usize,
+    /// Ignored bearing intervals of one laser.
+    pub ignored_sectors: usize,
+    /// Characters of a sentence.
+    pub text_chars: usize,
+    /// Other hearings of a sentence.
+    pub alternatives: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        Self {
+            payload_bytes: 1 << 20,
+            beams: 8192,
+            lasers: 8,
+            ignored_sectors: 64,
+            text_chars: 1000,
+            alternatives: 16,
+        }
+    }
+}
+
+/// Integers in JSON stay exact below this (2^53).
+const INTEGER_MAX: u64 = 1 << 53;
+/// Coordinates stay within this of the origin: an odometry frame that is further off is broken.
+const COORDINATE_MAX_M: f64 = 1e6;
+/// Longest range of any laser.
+const RANGE_MAX_M: f64 = 1e4;
+/// Longest time between two rays.
+const TIME_INCREMENT_MAX_S: f64 = 1.0;
+/// Angles may be unwrapped, but not absurd.
+const ANGLE_MAX_RAD: f64 = 1e4;
+
+impl Message {
+    /// Checks every field; names the first bad one.
+    pub fn validate(&self, limits: &Limits) -> Result<(), Invalid> {
+        if let Some(header) = self.header() {
+            check_header(header)?;
+        }
+        match self {
+            Self::Setup(m) => check_setup(m, limits),
+            Self::Odom(m) => check_pose("odom_from_body", &m.odom_from_body),
+            Self::Scan(m) => check_scan(m, limits),
+            Self::Say(m) => check_say(m, limits),
+            Self::End(_) => Ok(()),
+        }
+    }
+}
+
+fn check_header(h: &Header) -> Result<(), Invalid> {
+    check_id("robot", &h.robot)?;
+    if h.robot == ANY_ROBOT {
+        return Err(Invalid::new("robot", format!("\"{ANY_ROBOT}\" is reserved")));
+    }
+    for (field, value) in [("boot", h.boot), ("seq", h.seq)] {
+        if value >= INTEGER_MAX {
+            return Err(Invalid::new(field, format!("is {value}, must be below 2^53")));
+        }
+    }
+    Ok(())
+}
+
+fn check_number(field: &str, value: f64, min: f64, max: f64) -> Result<(), Invalid> {
+    if value >= min && value <= max {
+        return Ok(());
+    }
+    Err(Invalid::new(field, format!("is {value}, must be from {min} to {max}")))
+}
+
+fn check_count(field: &str, count: usize, max: usize) -> Result<(), Invalid> {
+    if count <= max {
+        return Ok(());
+    }
+    Err(Invalid::new(field, format!("has {count} entries, at most {max} are taken")))
+}
+
+fn check_pose(field: &str, pose: &Pose) -> Result<(), Invalid> {
+    check_number(&format!("{field}.x_m"), pose.x_m, -COORDINATE_MAX_M, COORDINATE_MAX_M)?;
+    check_number(&format!("{field}.y_m"), pose.y_m, -COORDINATE_MAX_M, COORDINATE_MAX_M)?;
+    check_number(&format!("{field}.yaw_rad"), pose.yaw_rad, -ANGLE_MAX_RAD, ANGLE_MAX_RAD)
+}
+
+fn check_setup(setup: &Setup, limits: &Limits) -> Result<(), Invalid> {
+    check_id("map", &setup.map)?;
+    check_count("lasers", setup.lasers.len(), limits.lasers)?;
+    if setup.lasers.is_empty() {
+        return Err(Invalid::new("lasers", "is empty, must name at least one"));
+    }
+    for (i, laser) in setup.lasers.iter().enumerate() {
+        check_laser(i, laser, limits)?;
+        if setup.lasers.iter().take(i).any(|other| other.id == laser.id) {
+            return Err(Invalid::new(&format!("lasers[{i}].id"), format!("{:?} comes twice", laser.id)));
+        }
+    }
+    Ok(())
+}
+
+fn check_laser(i: usize, laser: &Laser, limits: &Limits) -> Result<(), Invalid> {
+    let field = |name: &str| format!("lasers[{i}].{name}");
+    check_id(&field("id"), &laser.id)?;
+    // A laser that is hundreds of metres off its robot is a mistake of units.
+    check_number(&field("x_m"), laser.x_m, -100.0, 100.0)?;
+    check_number(&field("y_m"), laser.y_m, -100.0, 100.0)?;
+    check_number(&field("yaw_rad"), laser.yaw_rad, -ANGLE_MAX_RAD, ANGLE_MAX_RAD)?;
+    check_number(&field("range_min_m"), laser.range_min_m, 0.0, RANGE_MAX_M)?;
+    check_number(&field("range_max_m"), laser.range_max_m, 0.0, RANGE_MAX_M)?;
+    if laser.range_min_m >= laser.range_max_m {
+        let reason = format!("is {}, not above range_min_m {}", laser.range_max_m, laser.range_min_m);
+        return Err(Invalid::new(&field("range_max_m"), reason));
+    }
+    check_count(&field("ignored_rad"), laser.ignored_rad.len(), limits.ignored_sectors)?;
+    for (from, to) in &laser.ignored_rad {
+        check_number(&field("ignored_rad"), *from, -ANGLE_MAX_RAD, ANGLE_MAX_RAD)?;
+        check_number(&field("ignored_rad"), *to, *from, ANGLE_MAX_RAD)?;
+    }
+    Ok(())
+}
+
+fn check_scan(scan: &Scan, limits: &Limits) -> Result<(), Invalid> {
+    check_id("laser", &scan.laser)?;
+    check_number("angle_min_rad", scan.angle_min_rad, -ANGLE_MAX_RAD, ANGLE_MAX_RAD)?;
+    let turn = std::f64::consts::TAU;
+    check_number("angle_increment_rad", scan.angle_increment_rad, -turn, turn)?;
+    if scan.angle_increment_rad == 0.0 {
+        return Err(Invalid::new("angle_increment_rad", "is 0: all rays would be one"));
+    }
+    check_number("time_increment_s", scan.time_increment_s, 0.0, TIME_INCREMENT_MAX_S)?;
+    check_count("ranges_m", scan.ranges_m.len(), limits.beams)
+}
+
+fn check_say(say: &Say, limits: &Limits) -> Result<(), Invalid> {
+    check_token("id", &say.id)?;
+    if let Some(robot) = &say.robot {
+        check_id("robot", robot)?;
+    }
+    check_text("text", &say.text, limits)?;
+    check_count("alternatives", say.alternatives.len(), limits.alternatives)?;
+    for (i, hearing) in say.alternatives.iter().enumerate() {
+        check_text(&format!("alternatives[{i}].text"), &hearing.text, limits)?;
+        check_number(&format!("alternatives[{i}].p"), hearing.p, 0.0, 1.0)?;
+    }
+    for (field, token) in [("lang", &say.lang), ("speaker", &say.speaker), ("retracts", &say.retracts)] {
+        if let Some(token) = token {
+            check_token(field, token)?;
+        }
+    }
+    if let (Some(began), Some(ended)) = (say.began, say.ended)
+        && ended < began
+    {
+        return Err(Invalid::new("ended", "is before began"));
+    }
+    Ok(())
+}
+
+fn check_token(field: &str, token: &str) -> Result<(), Invalid> {
+    if token.is_empty() || token.len() > 64 || token.chars().any(char::is_control) {
+        return Err(Invalid::new(field, "must have 1 to 64 bytes and no control characters"));
+    }
+    Ok(())
+}
+
+fn check_text(field: &str, text: &str, limits: &Limits) -> Result<(), Invalid> {
+    if text.trim().is_empty() {
+        return Err(Invalid::new(field, "is empty"));
+    }
+    let chars = text.chars().count();
+    if chars > limits.text_chars {
+        let reason = format!("has {chars} characters, at most {} are taken", limits.text_chars);
+        return Err(Invalid::new(field, reason));
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stream::{Hearing, Odom, Stamp};
+
+    fn header() -> Header {
+        Header { robot: "r07".into(), ..Default::default() }
+    }
+
+    fn laser() -> Laser {
+        Laser {
+            id: "front".into(),
+            x_m: 0.1,
+            y_m: 0.0,
+            yaw_rad: 0.0,
+            upside_down: false,
+            range_min_m: 0.02,
+            range_max_m: 30.0,
+            ignored_rad: vec![(-0.1, 0.1)],
+        }
+    }
+
+    fn setup() -> Setup {
+        Setup { header: header(), map: "main".into(), lasers: vec![laser()] }
+    }
+
+    fn scan() -> Scan {
+        Scan {
+            header: header(),
+            laser: "front".into(),
+            angle_min_rad: -1.5,
+            angle_increment_rad: -0.01,
+            time_increment_s: 0.0,
+            ranges_m: vec![f32::NAN, f32::INFINITY, 1.0],
+        }
+    }
+
+    fn say() -> Say {
+        Say { id: "01ABC".into(), text: "this is the gym".into(), ..Default::default() }
+    }
+
+    fn refused(message: &Message) -> String {
+        message.validate(&Limits::default()).unwrap_err().field
+    }
+
+    #[test]
+    fn good_messages_pass() {
+        let odom = Odom { header: header(), odom_from_body: Pose::default() };
+        for m in [Message::Setup(setup()), Message::Scan(scan()), Message::Say(say()), Message::Odom(odom)] {
+            m.validate(&Limits::default()).unwrap();
+        }
+    }
+
+    #[test]
+    fn a_bad_header_is_named() {
+        let odom = |header| Message::Odom(Odom { header, odom_from_body: Pose::default() });
+        assert_eq!(refused(&odom(Header { robot: "R7".into(), ..header() })), "robot");
+        assert_eq!(refused(&odom(Header { robot: ANY_ROBOT.into(), ..header() })), "robot");
+        assert_eq!(refused(&odom(Header { boot: 1 << 53, ..header() })), "boot");
+        assert_eq!(refused(&odom(Header { seq: 1 << 53, ..header() })), "seq");
+    }
+
+    #[test]
+    fn a_bad_pose_is_named() {
+        for (x_m, yaw_rad, field) in [
+            (f64::NAN, 0.0, "odom_from_body.x_m"),
+            (2e6, 0.0, "odom_from_body.x_m"),
+            (0.0, f64::INFINITY, "odom_from_body.yaw_rad"),
+        ] {
+            let odom_from_body = Pose { x_m, y_m: 0.0, yaw_rad };
+            assert_eq!(refused(&Message::Odom(Odom { header: header(), odom_from_body })), field);
+        }
+    }
+
+    #[test]
+    fn a_bad_setup_is_named() {
+        let with = |change: &dyn Fn(&mut Setup)| {
+            let mut s = setup();
+            change(&mut s);
+            refused(&Message::Setup(s))
+        };
+        assert_eq!(with(&|s| s.map = "A b".into()), "map");
+        assert_eq!(with(&|s| s.lasers.clear()), "lasers");
+        assert_eq!(with(&|s| s.lasers = vec![laser(); 9]), "lasers");
+        assert_eq!(with(&|s| s.lasers = vec![laser(); 2]), "lasers[1].id");
+        assert_eq!(with(&|s| s.lasers[0].range_max_m = 0.01), "lasers[0].range_max_m");
+        assert_eq!(with(&|s| s.lasers[0].range_min_m = f64::NAN), "lasers[0].range_min_m");
+        assert_eq!(with(&|s| s.lasers[0].x_m = 500.0), "lasers[0].x_m");
+        assert_eq!(with(&|s| s.lasers[0].ignored_rad = vec![(0.2, 0.1)]), "lasers[0].ignored_rad");
+    }
+
+    #[test]
+    fn a_bad_scan_is_named() {
+        let with = |change: &dyn Fn(&mut Scan)| {
+            let mut s = scan();
+            change(&mut s);
+            refused(&Message::Scan(s))
+        };
+        assert_eq!(with(&|s| s.laser = String::new()), "laser");
+        assert_eq!(with(&|s| s.angle_increment_rad = 0.0), "angle_increment_rad");
+        assert_eq!(with(&|s| s.angle_min_rad = f64::NAN), "angle_min_rad");
+        assert_eq!(with(&|s| s.time_increment_s = -1.0), "time_increment_s");
+        assert_eq!(with(&|s| s.ranges_m = vec![1.0; 8193]), "ranges_m");
+    }
+
+    #[test]
+    fn a_bad_sentence_is_named() {
+        let with = |change: &dyn Fn(&mut Say)| {
+            let mut s = say();
+            change(&mut s);
+            refused(&Message::Say(s))
+        };
+        assert_eq!(with(&|s| s.id = String::new()), "id");
+        assert_eq!(with(&|s| s.text = "  ".into()), "text");
+        assert_eq!(with(&|s| s.text = "a".repeat(1001)), "text");
+        assert_eq!(with(&|s| s.speaker = Some("a\nb".into())), "speaker");
+        let hearing = |p| vec![Hearing { text: "gem".into(), p }];
+        assert_eq!(with(&|s| s.alternatives = hearing(1.5)), "alternatives[0].p");
+        assert_eq!(with(&|s| (s.began, s.ended) = (Some(Stamp { ns: 2 }), Some(Stamp { ns: 1 }))), "ended");
+    }
+}
