@@ -360,13 +360,14 @@ fn a_relocalisation_pulls_a_carried_tour_into_place() {
     let n = 60;
     let mut s = carried(17, n);
     let newest = 2 * n as u32 + 1;
+    assert!(s.smoother.marginal(newest).amax() > 1e3);
     s.close(10, newest, 0.01, 0.005);
     s.close(12, newest - 3, 0.01, 0.005);
     s.smoother.update().unwrap();
     for k in [n as u32 + 1, n as u32 + 30, newest] {
         assert!(s.smoother.pose(k).distance_m(&s.truth[k as usize]) < 1.5);
     }
-    assert!(s.smoother.marginal(newest)[(0, 0)] < 0.1);
+    assert!(s.smoother.marginal(newest).amax() < 2.0);
 }
 
 /// A walk on a city's grid, loops where it comes by again.
