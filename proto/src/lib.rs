@@ -6,13 +6,14 @@
 //!
 //! - [`stream`]: what robots and guides send; [`codec`] turns it into bytes and back,
 //!   [`validate`] refuses what is wrong with it.
-//! - [`answer`]: what the server says; [`selector`]: the arguments of a question.
+//! - [`answer`] and [`feedback`]: what the server says; [`selector`]: the arguments of a question.
 //! - [`keys`]: where all of it is on the network.
 //! - [`sequence`] and [`merge`]: into which order a robot's streams and a guide's sentences are
 //!   brought, on the network and offline alike; [`record`]: that order in a file.
 
 pub mod answer;
 pub mod codec;
+pub mod feedback;
 pub mod keys;
 pub mod merge;
 pub mod record;

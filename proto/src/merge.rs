@@ -182,7 +182,9 @@ mod tests {
 
     fn offline(stream: &[Message], says: Vec<Say>) -> Vec<Message> {
         let mut sentences = Sentences::default();
-        says.into_iter().for_each(|s| sentences.push(s, Stamp::default()));
+        for s in says {
+            sentences.push(s, Stamp::default());
+        }
         let mut all = Vec::new();
         for m in stream {
             while let Some(s) = sentences.pop_before(order_stamp(m)) {

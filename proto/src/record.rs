@@ -169,7 +169,9 @@ mod tests {
     fn written() -> Vec<u8> {
         let mut bytes = Vec::new();
         let mut writer = RecordWriter::new(&mut bytes).unwrap();
-        says().iter().for_each(|m| writer.write(m).unwrap());
+        for m in &says() {
+            writer.write(m).unwrap();
+        }
         writer.flush().unwrap();
         drop(writer);
         bytes

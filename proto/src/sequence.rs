@@ -170,7 +170,9 @@ mod tests {
         #[test]
         fn what_is_missing_is_told_once(present in prop::collection::btree_set(0..60_u64, 1..40)) {
             let mut s = Sequencer::new(WAIT, 100, None);
-            present.iter().for_each(|seq| s.push(Duration::ZERO, odom(0, *seq)));
+            for seq in &present {
+                s.push(Duration::ZERO, odom(0, *seq));
+            }
             let (mut seen, mut lost) = (Vec::new(), Vec::new());
             for step in drain(&mut s, WAIT) {
                 match step {

@@ -1,0 +1,167 @@
+//! What the server publishes of its own accord, and its answers about itself.
+
+use crate::answer::{MapIdentity, Problem};
+use crate::stream::{Pose, Stamp};
+use serde::{Deserialize, Serialize};
+
+/// On `out/heard`: what became of a sentence.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Heard {
+    /// The sentence's id.
+    pub id: String,
+    /// What became of it.
+    pub status: HeardStatus,
+    /// Whether it is on disk, and will outlive the server.
+    pub durable: bool,
+    /// The analysis; empty if there is none.
+    pub parse: String,
+    /// Where it was put, best first.
+    pub grounded: Vec<Grounded>,
+    /// In words, for the guide.
+    pub words: String,
+    /// Why it was refused.
+    pub error: Option<Problem>,
+}
+
+/// What became of a sentence.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HeardStatus {
+    /// The map knows it.
+    Understood,
+    /// Nothing changed.
+    NotUnderstood,
+    /// It could not be used.
+    Refused,
+}
+
+/// A place a sentence may speak of.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grounded {
+    /// Its id.
+    pub place: u64,
+    /// With which probability.
+    pub p: f64,
+}
+
+/// On `out/pose`, after every scan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PoseOut {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// Whose.
+    pub robot: String,
+    /// In which map; `rev` is that of the newest published graph.
+    pub map: MapIdentity,
+    /// Of the scan.
+    pub stamp: Stamp,
+    /// Correction of odometry (REP-105).
+    pub map_from_odom: Pose,
+    /// The body in the map.
+    pub map_from_body: Pose,
+    /// Covariance of `map_from_body`, row-major x y yaw, m² and rad²; the perturbation is on the
+    /// body's side.
+    pub covariance: [f64; 9],
+    /// Whether to believe it.
+    pub state: PoseState,
+}
+
+/// How well a robot knows where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum PoseState {
+    /// The map grows.
+    Mapping,
+    /// The robot is found in a map that is kept.
+    Localised,
+    /// It isn't known.
+    Lost,
+}
+
+/// On `out/ack`: everything of this boot up to and with `seq` was handed to the map, or given up.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Ack {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// Whose stream.
+    pub robot: String,
+    /// Which boot.
+    pub boot: u64,
+    /// The watermark; nothing at or below it need be sent again.
+    pub seq: u64,
+    /// Whether all of it is in a record on disk.
+    pub durable: bool,
+    /// Messages given up since the server started.
+    pub lost: u64,
+}
+
+/// On `out/state`: how the server gets along with a robot.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct RobotState {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// Which robot.
+    pub robot: String,
+    /// The map its streams go to; none before an accepted setup.
+    pub map: Option<String>,
+    /// Boot of the newest message.
+    pub boot: Option<u64>,
+    /// Since the server started.
+    pub counts: Counts,
+    /// The newest refusal.
+    pub error: Option<Problem>,
+}
+
+/// Messages of a robot since the server started.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Counts {
+    /// Handed to the map.
+    pub taken: u64,
+    /// Refused: undecodable, invalid, or for a map that is another robot's.
+    pub refused: u64,
+    /// Came again and were dropped.
+    pub repeated: u64,
+    /// Of an earlier boot than the newest, dropped.
+    pub stale: u64,
+    /// Never came, or came too late: data loss.
+    pub lost: u64,
+}
+
+/// On `map/{map}/out/jump`: coordinates of the map changed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Jump {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// The map, with the epoch after the jump.
+    pub map: MapIdentity,
+    /// New map frame from old, through the robot's current pose.
+    pub new_from_old: Pose,
+}
+
+/// Answer of `info`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Info {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// Program and version.
+    pub server: String,
+    /// Site.
+    pub site: String,
+    /// The maps there are.
+    pub maps: Vec<MapIdentity>,
+    /// The robots that were heard.
+    pub robots: Vec<RobotState>,
+    /// Messages dropped because the server could not keep up: data loss.
+    pub overrun: u64,
+}
+
+/// Answer of a command that succeeded.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Done {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// The command.
+    pub query: String,
+    /// The maps it concerned.
+    pub maps: Vec<String>,
+}
