@@ -1,0 +1,206 @@
+//! From what a recogniser or a keyboard yields to sentences of plain words: case, curly quotes,
+//! accents, contractions, punctuation. One pass, linear in the text.
+
+/// Longer texts are not listened to.
+pub const MAX_TEXT_BYTES: usize = 4096;
+
+/// The token for a comma, colon, dash or bracket inside a sentence.
+pub(super) const COMMA: &str = ",";
+
+/// A sentence as words of lower case and [`COMMA`]s.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub(super) struct Sentence {
+    /// Words; contractions are taken apart ("we're" is "we are"), a possessive keeps its 's.
+    pub(super) words: Vec<String>,
+    /// It ended in a question mark.
+    pub(super) question: bool,
+}
+
+/// Splits a text into sentences; nothing if it is longer than [`MAX_TEXT_BYTES`].
+pub(super) fn sentences(text: &str) -> Vec<Sentence> {
+    if text.len() > MAX_TEXT_BYTES {
+        return Vec::new();
+    }
+    let chars: Vec<char> = text.chars().flat_map(char::to_lowercase).map(plain).collect();
+    let mut done = Vec::new();
+    let mut now = Sentence::default();
+    let mut at = 0;
+    while at < chars.len() {
+        let c = chars[at];
+        let next = chars.get(at + 1).copied();
+        if c.is_alphanumeric() {
+            let end = word_end(&chars, at);
+            now.words.push(chars[at..end].iter().collect());
+            at = end;
+            continue;
+        }
+        match c {
+            '.' if ends_abbreviation(&now) || next.is_some_and(char::is_alphanumeric) => {}
+            '?' | '!' | '.' | '…' | ';' | '\n' | '\r' => finish(&mut now, &mut done, c == '?'),
+            ',' | ':' | '(' | ')' | '[' | ']' | '–' | '—' => push_comma(&mut now),
+            '-' if next.is_none_or(|n| !n.is_alphanumeric()) => push_comma(&mut now),
+            '&' => now.words.push("and".to_owned()),
+            _ => {}
+        }
+        at += 1;
+    }
+    finish(&mut now, &mut done, false);
+    done
+}
+
+/// One past the last character of the word that begins at `at`: letters or digits, one kind at a
+/// time but for ordinals ("2nd"), with apostrophes inside.
+fn word_end(chars: &[char], at: usize) -> usize {
+    let digits = at + chars[at..].iter().take_while(|c| c.is_ascii_digit()).count();
+    if digits > at {
+        let letters: String = chars[digits..].iter().take_while(|c| c.is_alphanumeric()).take(3).collect();
+        let ordinal = matches!(letters.as_str(), "st" | "nd" | "rd" | "th");
+        return if ordinal { digits + 2 } else { digits };
+    }
+    let mut end = at;
+    while let Some(&c) = chars.get(end) {
+        let inside = c == '\'' && chars.get(end + 1).is_some_and(|n| n.is_alphabetic());
+        if c.is_ascii_digit() || !(c.is_alphanumeric() || inside) {
+            break;
+        }
+        end += 1;
+    }
+    // A character that is alphanumeric but neither kind still moves on.
+    end.max(at + 1)
+}
+
+/// Curly quotes and the accents of Western Europe, made plain.
+fn plain(c: char) -> char {
+    match c {
+        '‘' | '’' | 'ʼ' | '`' | '´' => '\'',
+        '‐' | '‑' => '-',
+        'à' | 'á' | 'â' | 'ã' | 'ä' | 'å' => 'a',
+        'è' | 'é' | 'ê' | 'ë' => 'e',
+        'ì' | 'í' | 'î' | 'ï' => 'i',
+        'ò' | 'ó' | 'ô' | 'õ' | 'ö' => 'o',
+        'ù' | 'ú' | 'û' | 'ü' => 'u',
+        'ç' => 'c',
+        'ñ' => 'n',
+        _ => c,
+    }
+}
+
+fn ends_abbreviation(now: &Sentence) -> bool {
+    now.words.last().is_some_and(|w| matches!(w.as_str(), "dr" | "mr" | "mrs" | "ms" | "prof" | "st" | "no"))
+        // "no." ends a sentence when it is all of it.
+        && !(now.words.len() == 1 && now.words[0] == "no")
+}
+
+fn push_comma(now: &mut Sentence) {
+    if now.words.last().is_some_and(|w| w != COMMA) {
+        now.words.push(COMMA.to_owned());
+    }
+}
+
+fn finish(now: &mut Sentence, done: &mut Vec<Sentence>, question: bool) {
+    if now.words.last().is_some_and(|w| w == COMMA) {
+        now.words.pop();
+    }
+    if !now.words.is_empty() {
+        done.push(Sentence { words: expand(std::mem::take(&mut now.words)), question });
+    }
+}
+
+/// Takes contractions apart and mends what phones write.
+fn expand(words: Vec<String>) -> Vec<String> {
+    let mut out: Vec<String> = Vec::with_capacity(words.len() + 4);
+    for (at, word) in words.iter().enumerate() {
+        let next = words.get(at + 1).map_or("", String::as_str);
+        if let Some(apart) = contraction(word) {
+            out.extend(apart.iter().map(|&w| w.to_owned()));
+        } else if let Some(stem) = word.strip_suffix("n't") {
+            out.push(if word == "can't" { "can".to_owned() } else { stem.to_owned() });
+            out.push("not".to_owned());
+        } else if let Some(stem) = word.strip_suffix("'s").filter(|_| starts_place_phrase(next)) {
+            // "the kitchen's down the hall"
+            out.push(stem.to_owned());
+            out.push("is".to_owned());
+        } else {
+            out.push(word.clone());
+        }
+    }
+    out
+}
+
+fn starts_place_phrase(word: &str) -> bool {
+    matches!(
+        word,
+        "down"
+            | "near"
+            | "through"
+            | "next"
+            | "away"
+            | "just"
+            | "right"
+            | "by"
+            | "close"
+            | "beside"
+            | "along"
+            | "not"
+    )
+}
+
+fn contraction(word: &str) -> Option<&'static [&'static str]> {
+    Some(match word {
+        "i'm" | "im" => &["i", "am"],
+        "we're" => &["we", "are"],
+        "you're" | "youre" => &["you", "are"],
+        "they're" => &["they", "are"],
+        "it's" => &["it", "is"],
+        "that's" | "thats" => &["that", "is"],
+        "this's" => &["this", "is"],
+        "here's" | "heres" => &["here", "is"],
+        "here're" => &["here", "are"],
+        "there's" | "theres" => &["there", "is"],
+        "where's" | "wheres" => &["where", "is"],
+        "where're" => &["where", "are"],
+        "what's" | "whats" => &["what", "is"],
+        "we've" => &["we", "have"],
+        "i've" => &["i", "have"],
+        "you've" => &["you", "have"],
+        "you'll" => &["you", "will"],
+        "we'll" => &["we", "will"],
+        "thru" => &["through"],
+        "ur" => &["your"],
+        "isnt" => &["is", "not"],
+        "arent" => &["are", "not"],
+        "nearby" => &["near", "here"],
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn plain_words(text: &str) -> Vec<String> {
+        sentences(text).iter().map(|s| s.words.join(" ") + if s.question { "?" } else { "" }).collect()
+    }
+
+    #[test]
+    fn sentences_become_plain_words() {
+        for (text, expected) in [
+            ("And we’re back in the elevator lobby.", vec!["and we are back in the elevator lobby"]),
+            ("HERE IS the Café!!  Where's the loo?", vec!["here is the cafe", "where is the loo?"]),
+            ("Ok, so - this is it: gym", vec!["ok , so , this is it , gym"]),
+            ("room 3.14, 32-G, 2nd floor", vec!["room 3 14 , 32 g , 2nd floor"]),
+            ("Dr. Smith's office's down the hall. No.", vec!["dr smith's office is down the hall", "no"]),
+            ("isn't; can't", vec!["is not", "can not"]),
+            ("the Z-center", vec!["the z center"]),
+            ("...!?", vec![]),
+        ] {
+            assert_eq!(plain_words(text), expected, "{text}");
+        }
+    }
+
+    #[test]
+    fn too_long_a_text_is_not_listened_to() {
+        let long = "this is the gym. ".repeat(MAX_TEXT_BYTES / 17 + 1);
+        assert!(sentences(&long).is_empty());
+    }
+}
