@@ -1,76 +1,306 @@
-//! The core's public face.
-use crate::query::{GraphAnswer, WhereAnswer};
-use crate::{Answer, Config, Effects, Event, Query};
+//! The core's public face: events in, effects out.
+
+use crate::effects::{Effect, Effects, TrackState};
+use crate::event::{Laser, Odom, Scan, Setup, StampNs, Utterance};
+use crate::filter::Filter;
+use crate::geometry::Pose2;
+use crate::graph::{Place, Vertex};
+use crate::listen::Here;
+use crate::odometry::{Odometry, Step};
+use crate::particle::{Edge, Particle};
+use crate::propose::LOST_SIGMA_M;
+use crate::scan::front::{FrontEnd, FrozenPlace, OpenPlace};
+use crate::scan::sweep::sweep;
+use crate::snapshot::Snapshot;
+use crate::{Answer, Config, Event, Query};
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
+/// Scans that wait for odometry to bracket their sweep.
+const WAITING_MAX: usize = 64;
+/// A scan waits for odometry no longer than this, in stamps of the odometry or of later scans.
+const WAIT_NS: i64 = 500_000_000;
+
 /// One map and the robot on it.
+#[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mapper {
-    config: Config,
+    filter: Filter,
+    track: Track,
+    /// +1 when coordinates jump.
+    epoch: u64,
+    /// +1 per change.
+    rev: u64,
 }
 
-/// The posterior at one moment: answers questions, never changes.
-pub struct Snapshot {}
+/// The robot's streams, up to the places they make.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Track {
+    lasers: BTreeMap<String, Laser>,
+    odometry: Odometry,
+    waiting: VecDeque<Scan>,
+    front: FrontEnd,
+    scans: u64,
+    odom_from_body: Option<Pose2>,
+}
 
 /// A saved map could not be written or read.
 #[derive(Debug, thiserror::Error)]
 pub enum SaveError {
     /// The encoder refused.
     #[error("the map could not be encoded: {0}")]
-    Encode(String),
-    /// These bytes are not a saved map of this build.
-    #[error("not a saved map that this build can read: {0}")]
-    Decode(String),
+    Encode(#[from] bincode::error::EncodeError),
+    /// These bytes are not a saved map.
+    #[error("not a saved map: {0}")]
+    Decode(#[from] bincode::error::DecodeError),
+    /// They are a saved map, but of another format.
+    #[error("a saved map of format {found:?}; this build reads {expected:?}")]
+    Format {
+        /// What the file says.
+        found: String,
+        /// What this build writes.
+        expected: String,
+    },
+}
+
+/// Format of a saved map; changes whenever its content does.
+const FORMAT: &str = concat!("toponym map ", env!("CARGO_PKG_VERSION"), " ");
+
+/// A map is exact only on the kind of machine that it was made on.
+fn format_here() -> String {
+    format!("{FORMAT}{}", std::env::consts::ARCH)
 }
 
 impl Mapper {
     /// An empty map.
     pub fn new(config: Config) -> Self {
-        Self { config }
+        let front = FrontEnd::new(config.place_spacing_m);
+        let track = Track {
+            lasers: BTreeMap::new(),
+            odometry: Odometry::default(),
+            waiting: VecDeque::new(),
+            front,
+            scans: 0,
+            odom_from_body: None,
+        };
+        Self { filter: Filter::new(config), track, epoch: 0, rev: 0 }
     }
+
     /// Takes one event.
-    pub fn step(&mut self, _event: Event) -> Effects {
-        Vec::new()
+    pub fn step(&mut self, event: Event) -> Effects {
+        let mut effects = Effects::new();
+        match event {
+            Event::Setup(setup) => self.track.set_up(setup),
+            Event::Odom(odom) => self.odom(&odom, &mut effects),
+            Event::Scan(scan) => self.scan(scan, &mut effects),
+            Event::Utterance(utterance) => self.hear(&utterance, &mut effects),
+            Event::Flush => self.flush(&mut effects),
+        }
+        effects
     }
+
     /// Answers from the newest snapshot.
     pub fn answer(&self, query: &Query) -> Answer {
         self.snapshot().answer(query)
     }
+
     /// The posterior now.
     pub fn snapshot(&self) -> Arc<Snapshot> {
-        Arc::new(Snapshot {})
+        Arc::new(Snapshot::new(
+            &self.filter,
+            self.track.front.open_places().cloned().collect(),
+            self.map_from_body(),
+            (self.epoch, self.rev),
+        ))
     }
+
     /// The whole mapper as bytes.
     pub fn save(&self) -> Result<Vec<u8>, SaveError> {
-        Ok(Vec::new())
+        Ok(bincode::serde::encode_to_vec((format_here(), self), bincode::config::standard())?)
     }
+
     /// What [`Mapper::save`] wrote.
-    pub fn load(_bytes: &[u8]) -> Result<Self, SaveError> {
-        Ok(Self { config: Config::default() })
+    pub fn load(bytes: &[u8]) -> Result<Self, SaveError> {
+        let config = bincode::config::standard();
+        let (found, read): (String, usize) = bincode::serde::decode_from_slice(bytes, config)?;
+        let expected = format_here();
+        if found != expected {
+            return Err(SaveError::Format { found, expected });
+        }
+        let rest = bytes.get(read..).unwrap_or_default();
+        let (mapper, _): (Self, usize) = bincode::serde::decode_from_slice(rest, config)?;
+        Ok(mapper)
     }
+
     /// Its settings.
     pub fn config(&self) -> &Config {
-        &self.config
+        &self.filter.config
+    }
+
+    fn odom(&mut self, odom: &Odom, effects: &mut Effects) {
+        if let Step::Broken(reason) = self.track.odometry.push(odom) {
+            // What still waits belongs to the old segment, whose odometry is gone.
+            for scan in self.track.waiting.drain(..) {
+                let reason = "odometry broke before it covered the sweep".to_owned();
+                effects.push(Effect::ScanDropped { stamp_ns: scan.stamp_ns, reason });
+            }
+            self.track.front.break_odometry();
+            effects.push(Effect::SegmentBegan { stamp_ns: odom.stamp_ns, reason });
+        }
+        self.place_waiting(Some(odom.stamp_ns), effects);
+    }
+
+    fn scan(&mut self, scan: Scan, effects: &mut Effects) {
+        if !self.track.lasers.contains_key(&scan.laser) {
+            let reason = format!("laser {:?} was never set up", scan.laser);
+            effects.push(Effect::ScanDropped { stamp_ns: scan.stamp_ns, reason });
+            return;
+        }
+        let now_ns = scan.stamp_ns;
+        self.track.waiting.push_back(scan);
+        self.place_waiting(Some(now_ns), effects);
+    }
+
+    /// Places the scans that odometry brackets, or whose time is up. None: all of them.
+    fn place_waiting(&mut self, now_ns: Option<StampNs>, effects: &mut Effects) {
+        while let Some(scan) = self.track.waiting.front() {
+            let end_ns = sweep_end_ns(scan);
+            let bracketed = self.track.odometry.newest_ns().is_some_and(|newest| newest >= end_ns);
+            let late = now_ns.is_none_or(|now| now.saturating_sub(end_ns) > WAIT_NS);
+            if !(bracketed || late || self.track.waiting.len() > WAITING_MAX) {
+                return;
+            }
+            if let Some(scan) = self.track.waiting.pop_front() {
+                self.place(&scan, effects);
+            }
+        }
+    }
+
+    fn place(&mut self, scan: &Scan, effects: &mut Effects) {
+        let stamp_ns = scan.stamp_ns;
+        let Some(odom_from_body) = self.track.odometry.at(stamp_ns) else {
+            let reason = "no odometry yet".to_owned();
+            effects.push(Effect::ScanDropped { stamp_ns, reason });
+            return;
+        };
+        let Some(laser) = self.track.lasers.get(&scan.laser) else { return };
+        let odometry = &self.track.odometry;
+        let motion = |dt_s: f64| {
+            odometry.at(stamp_ns + (dt_s * 1e9) as i64).map_or(Pose2::default(), |p| odom_from_body.between(&p))
+        };
+        let sweep = sweep(scan, laser, motion);
+        let placed = self.track.front.scan(stamp_ns, odom_from_body, sweep);
+        self.track.odom_from_body = Some(odom_from_body);
+        effects.push(Effect::ScanPlaced {
+            scan: self.track.scans,
+            stamp_ns,
+            place: placed.place,
+            place_from_body: placed.place_from_body,
+            odom_from_body,
+        });
+        self.track.scans += 1;
+        if placed.began {
+            effects.push(Effect::PlaceBegan { place: placed.place, stamp_ns });
+            self.rev += 1;
+        }
+        self.grow(placed.frozen, effects);
+        effects.push(self.tracked(stamp_ns, odom_from_body));
+    }
+
+    /// Algorithm 1 for each place just left.
+    fn grow(&mut self, frozen: Vec<FrozenPlace>, effects: &mut Effects) {
+        for place in frozen {
+            let (before, edges) = (self.map_from_body(), self.filter.best().edges.clone());
+            effects.extend(self.filter.step(place));
+            self.rev += 1;
+            if !continues(&edges, &self.filter.best().edges)
+                && let (Some(old), Some(new)) = (before, self.map_from_body())
+            {
+                self.epoch += 1;
+                effects.push(Effect::Jumped {
+                    epoch: self.epoch,
+                    new_from_old: new.compose(&old.inverse()),
+                });
+            }
+        }
+    }
+
+    fn hear(&mut self, u: &Utterance, effects: &mut Effects) {
+        let open: Vec<OpenPlace> = self.track.front.open_places().cloned().collect();
+        let places = self.filter.graph.places().to_vec();
+        let path_m: Vec<f64> =
+            places.iter().map(|p| p.path_m).chain(open.iter().map(|p| p.path_m)).collect();
+        let stamps = places.iter().map(|p| p.stamp_ns).chain(open.iter().map(|p| p.stamp_ns));
+        let stamps: Vec<StampNs> = stamps.collect();
+        // The place held when the sentence began; one from before the map is said of its first.
+        let held = stamps.iter().rposition(|&s| s <= u.began_ns).or((!stamps.is_empty()).then_some(0));
+        let poses = |p: &Particle| {
+            let mut poses = p.smoother.poses().to_vec();
+            poses.extend(open_poses(p, &places, &open));
+            poses
+        };
+        let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m };
+        effects.push(Effect::Heard(self.filter.hear(u, &here)));
+        self.rev += 1;
+    }
+
+    fn flush(&mut self, effects: &mut Effects) {
+        self.place_waiting(None, effects);
+        let frozen = self.track.front.freeze(f64::INFINITY);
+        self.grow(frozen, effects);
+    }
+
+    /// The robot in the best particle's map.
+    fn map_from_body(&self) -> Option<Pose2> {
+        let (front, best) = (&self.track.front, self.filter.best());
+        let body = front.front_from_body();
+        if let Some(v) = best.smoother.len().checked_sub(1) {
+            let place = self.filter.graph.place(v as Vertex);
+            return Some(best.smoother.pose(v as Vertex).compose(&place.front_from_place.between(&body)));
+        }
+        front.open_places().next().map(|first| first.front_from_place.between(&body))
+    }
+
+    fn tracked(&self, stamp_ns: StampNs, odom_from_body: Pose2) -> Effect {
+        let map_from_body = self.map_from_body().unwrap_or_default();
+        let best = &self.filter.best().smoother;
+        let at_place = best.len().checked_sub(1).map_or_else(Matrix3::zeros, |v| best.marginal(v as Vertex));
+        let covariance = at_place + self.track.front.since_place();
+        let lost = covariance[(0, 0)].max(covariance[(1, 1)]).sqrt() > LOST_SIGMA_M;
+        Effect::Tracked {
+            stamp_ns,
+            map_from_body,
+            map_from_odom: map_from_body.compose(&odom_from_body.inverse()),
+            covariance,
+            state: if lost { TrackState::Lost } else { TrackState::Mapping },
+        }
     }
 }
 
-impl Snapshot {
-    /// Answers a question; never fails: not knowing is an answer.
-    pub fn answer(&self, query: &Query) -> Answer {
-        match query {
-            Query::Where { text } => Answer::Where(WhereAnswer {
-                text: text.clone(),
-                label: None,
-                via: "unknown".into(),
-                p_none: 1.0,
-                candidates: vec![],
-                robot: None,
-            }),
-            Query::Labels => Answer::Labels(vec![]),
-            Query::Graph | Query::Grid { .. } => Answer::Graph(self.graph()),
-        }
+impl Track {
+    fn set_up(&mut self, setup: Setup) {
+        self.lasers = setup.lasers.into_iter().map(|l| (l.id.clone(), l)).collect();
     }
-    /// All graphs.
-    pub fn graph(&self) -> GraphAnswer {
-        GraphAnswer { epoch: 0, rev: 0, places: vec![], particles: vec![], effective_sample_size: 0.0 }
-    }
+}
+
+/// Poses, in a particle's map, of the places that are not frozen yet.
+pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> {
+    let last = p.smoother.len().checked_sub(1).map(|v| v as Vertex);
+    let map_from_front = match (last, open.first()) {
+        (Some(v), _) => p.smoother.pose(v).compose(&places[v as usize].front_from_place.inverse()),
+        (None, Some(first)) => first.front_from_place.inverse(),
+        (None, None) => Pose2::default(),
+    };
+    open.iter().map(|o| map_from_front.compose(&o.front_from_place)).collect()
+}
+
+fn sweep_end_ns(scan: &Scan) -> StampNs {
+    let beams = scan.ranges_m.len().saturating_sub(1) as f64;
+    scan.stamp_ns.saturating_add((scan.time_increment_s.max(0.0) * beams * 1e9) as i64)
+}
+
+/// Whether a graph is another one with edges added.
+fn continues(before: &[Edge], after: &[Edge]) -> bool {
+    after.len() >= before.len() && after.iter().zip(before).all(|(a, b)| a == b)
 }

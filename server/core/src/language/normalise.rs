@@ -102,12 +102,12 @@ fn finish(now: &mut Sentence, done: &mut Vec<Sentence>, question: bool) {
         now.words.pop();
     }
     if !now.words.is_empty() {
-        done.push(Sentence { words: expand(std::mem::take(&mut now.words)), question });
+        done.push(Sentence { words: expand(&std::mem::take(&mut now.words)), question });
     }
 }
 
 /// Takes contractions apart and mends what phones write.
-fn expand(words: Vec<String>) -> Vec<String> {
+fn expand(words: &[String]) -> Vec<String> {
     let mut out: Vec<String> = Vec::with_capacity(words.len() + 4);
     for (at, word) in words.iter().enumerate() {
         let next = words.get(at + 1).map_or("", String::as_str);

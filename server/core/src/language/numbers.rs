@@ -46,7 +46,7 @@ fn run(words: &[String], start: usize) -> (String, usize) {
         let after_ten = at > start && TENS.contains(&words[at - 1].as_str());
         if word == "hundred" && at > start {
             let (rest, end) = below_hundred(words, at + 1);
-            digits.push_str(&format!("{rest:02}"));
+            digits.extend([char::from(b'0' + rest / 10), char::from(b'0' + rest % 10)]);
             at = end;
             continue;
         }
@@ -66,9 +66,9 @@ fn run(words: &[String], start: usize) -> (String, usize) {
 }
 
 /// The number below one hundred that may follow "hundred" (0 if none does), and where it ends.
-fn below_hundred(words: &[String], at: usize) -> (usize, usize) {
+fn below_hundred(words: &[String], at: usize) -> (u8, usize) {
     let word = |i: usize| words.get(i).map_or("", String::as_str);
-    let index = |list: &[&str], w: &str| list.iter().position(|x| *x == w);
+    let index = |list: &[&str], w: &str| list.iter().zip(0_u8..).find(|(x, _)| **x == w).map(|(_, i)| i);
     let first = if word(at) == "and" { at + 1 } else { at };
     if let Some(tens) = index(&TENS, word(first)) {
         let unit = index(&UNITS, word(first + 1)).filter(|u| *u > 0);
@@ -108,9 +108,9 @@ fn say(digits: &str, out: &mut Vec<String>) {
         return;
     }
     if lead == 1 {
-        out.push(UNITS[d[0]].to_owned())
+        out.push(UNITS[d[0]].to_owned());
     } else {
-        say_two(d[0], d[1], out)
+        say_two(d[0], d[1], out);
     }
     match d[lead..] {
         [0, 0] => out.push("hundred".to_owned()),

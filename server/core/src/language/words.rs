@@ -65,7 +65,7 @@ pub fn words(acts: &[Act], known: impl Fn(&Name) -> bool) -> String {
             && !known(name)
         {
             missing.push(name);
-            text.push_str(&format!(" I don't know of {} yet.", with_indefinite(name)));
+            text.extend([" I don't know of ", &with_indefinite(name), " yet."]);
         }
     }
     text

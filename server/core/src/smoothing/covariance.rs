@@ -1,8 +1,9 @@
-//! Covariances at the last solution, without the cancellation of large absolute uncertainties.
+//! Covariances at the last solution, as sums of positive parts.
 //!
 //! After a lost odometry the newest places may hang on the first by a link of 50 m and π rad,
-//! and on one another by links of a centimetre. Differences of absolute covariances (each some
-//! 10⁴ m²) would then say nothing about centimetres. So we hold
+//! and on one another by links of a centimetre. A relative covariance taken as a difference of
+//! absolute ones (10⁴ m² and more) would lose its last digits and, in the end, its definiteness.
+//! So we hold
 //!
 //! - `C = H_oo⁻¹`: covariances given the first *and* the newest pose of the solution (m),
 //! - `D_j = −(H_oo⁻¹ H_om)_j`: how pose j follows a motion of m, with `D_0 = 0`, `D_m = I`,

@@ -34,21 +34,14 @@ pub(super) struct Linearised {
 
 impl Factor {
     /// `e = log(z⁻¹ · xᵢ⁻¹xⱼ)`.
-    fn error(&self, poses: &[Pose2]) -> Vector3<f64> {
+    pub(super) fn error(&self, poses: &[Pose2]) -> Vector3<f64> {
         let i_from_j = poses[self.i as usize].between(&poses[self.j as usize]);
         self.i_from_j.between(&i_from_j).log()
     }
 
-    /// `eᵀ Ω e`.
-    pub(super) fn chi2(&self, poses: &[Pose2]) -> f64 {
-        let e = self.error(poses);
-        e.dot(&(self.information * e))
-    }
-
     /// With `δj` the error moves by `Jr⁻¹(e) δj`, with `δi` by `−Jr⁻¹(e) Ad(xⱼ⁻¹xᵢ) δi`.
-    pub(super) fn linearise(&self, poses: &[Pose2]) -> Linearised {
-        let e = self.error(poses);
-        let jr = right_jacobian_inverse(&e);
+    pub(super) fn linearise(&self, poses: &[Pose2], e: &Vector3<f64>) -> Linearised {
+        let jr = right_jacobian_inverse(e);
         let weighted = jr.transpose() * self.information;
         let h_jj = weighted * jr;
         let g_j = weighted * e;

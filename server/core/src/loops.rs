@@ -1,0 +1,271 @@
+//! The measurements z of a step: each proposed pair matched once, for all particles.
+//!
+//! A pair that nobody has followed yet is matched without any prior. A fit that is found is
+//! *followed*: the front end says where the next place should lie on the old part of the path, and
+//! registration there agrees or not. Only fits with the agreement of at least [`SUPPORT_MIN`]
+//! places over [`SUPPORT_PATH_M`] count as evidence: look-alikes rarely continue alike.
+
+use crate::effects::EdgeKind;
+use crate::geometry::Pose2;
+use crate::graph::{Graph, Matched, Vertex};
+use crate::propose::Proposal;
+use crate::scan::front::LOCAL_PATH_M;
+use crate::scan::matching::{Mode, Target, modes, refine};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Fits below are no fits.
+pub const SCORE_MIN: f64 = 0.75;
+/// Share of the points that both places must see.
+const OVERLAP_MIN: f64 = 0.25;
+/// Places that must agree before a loop counts …
+const SUPPORT_MIN: u32 = 3;
+/// … over so much path.
+const SUPPORT_PATH_M: f64 = 5.0;
+/// Path between the places asked for agreement.
+const SUPPORT_STEP_M: f64 = 2.5;
+/// How far along the old path the match for the next place is looked for.
+const FOLLOW_REACH_M: f64 = 6.0;
+/// A followed place must lie so near to a place of the old path.
+const FOLLOW_NEAR_M: f64 = 3.0;
+/// Fits so near to what the front end predicts agree with it.
+const AGREE_M: f64 = 0.3;
+const AGREE_RAD: f64 = 0.06;
+/// Fits followed at a time.
+const FOLLOWED_MAX: usize = 8;
+/// A fit that finds no support over so many places is dropped.
+const UNSUPPORTED_MAX: u32 = 8;
+
+/// A fit between the newest place and an older one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Fit {
+    /// The older place.
+    pub i: Vertex,
+    /// The measurement.
+    pub mode: Mode,
+    /// How the revisit was first proposed.
+    pub kind: EdgeKind,
+    /// Places that agree with it, itself included.
+    pub support: u32,
+    /// Path over which they agree, metres.
+    pub support_path_m: f64,
+    /// Places since it was first found.
+    age: u32,
+}
+
+impl Fit {
+    /// Whether enough places agree for it to count.
+    pub fn supported(&self) -> bool {
+        self.support >= SUPPORT_MIN && self.support_path_m >= SUPPORT_PATH_M
+    }
+
+    fn quality(&self) -> f64 {
+        self.mode.score * self.mode.overlap
+    }
+}
+
+/// A pair that was looked at and did not fit, and why.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// The older place.
+    pub i: Vertex,
+    /// How it was proposed.
+    pub kind: EdgeKind,
+    /// Why.
+    pub reason: String,
+}
+
+/// All measurements of a step.
+#[derive(Clone, Debug, Default)]
+pub struct Measured {
+    /// Supported fits, one per revisit.
+    pub fits: Vec<Fit>,
+    /// What did not fit.
+    pub refused: Vec<Refusal>,
+}
+
+/// Fits being followed from place to place.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Loops {
+    followed: Vec<Fit>,
+}
+
+/// A pair to register from a guess.
+struct Lead {
+    i: Vertex,
+    guess: Pose2,
+    from: Fit,
+}
+
+impl Loops {
+    /// Whether an older place lies on a stretch that is being followed.
+    pub fn covers(&self, graph: &Graph, i: Vertex) -> bool {
+        self.followed.iter().any(|f| !graph.apart(f.i, i, FOLLOW_REACH_M))
+    }
+
+    /// Matches place `t` with the proposed places and along what is being followed.
+    pub fn measure(&mut self, graph: &mut Graph, t: Vertex, proposals: &[Proposal]) -> Measured {
+        let mut measured = Measured::default();
+        let leads: Vec<Lead> = self.followed.iter().filter_map(|f| lead(graph, f, t)).collect();
+        let mut fits: Vec<Fit> = leads.par_iter().filter_map(|l| follow(graph, t, l)).collect();
+        match_new(graph, t, proposals);
+        for p in proposals {
+            let found = graph.memo.get(&(p.i, t)).map_or(&[][..], |m| &m.modes);
+            measured.refused.extend(refusal(p, t, found));
+            fits.extend(found.iter().filter(|m| good(m)).map(|m| Fit {
+                i: p.i,
+                mode: *m,
+                kind: p.kind,
+                support: 1,
+                support_path_m: 0.0,
+                age: 0,
+            }));
+        }
+        let mut fits = distinct(graph, fits);
+        fits.par_iter_mut().filter(|f| !f.supported()).for_each(|f| look_back(graph, t, f));
+        for f in fits.iter().filter(|f| !f.supported()) {
+            measured.refused.push(Refusal {
+                i: f.i,
+                kind: f.kind,
+                reason: format!(
+                    "edge {t}–{} refused: {} places over {:.1} m agree, {SUPPORT_MIN} over {SUPPORT_PATH_M} needed",
+                    f.i, f.support, f.support_path_m
+                ),
+            });
+        }
+        fits.retain(|f| f.supported() || f.age < UNSUPPORTED_MAX);
+        fits.truncate(FOLLOWED_MAX);
+        measured.fits = fits.iter().filter(|f| f.supported()).cloned().collect();
+        self.followed = fits;
+        measured
+    }
+}
+
+fn good(mode: &Mode) -> bool {
+    mode.score >= SCORE_MIN && mode.overlap >= OVERLAP_MIN
+}
+
+fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
+    if found.iter().any(good) {
+        return None;
+    }
+    let reason = match found.first() {
+        None => format!("edge {t}–{} refused: no transform lays one on the other", p.i),
+        Some(m) if m.score < SCORE_MIN => {
+            format!("edge {t}–{} refused: score {:.2} < {SCORE_MIN}", p.i, m.score)
+        }
+        Some(m) => format!("edge {t}–{} refused: overlap {:.2} < {OVERLAP_MIN}", p.i, m.overlap),
+    };
+    Some(Refusal { i: p.i, kind: p.kind, reason })
+}
+
+/// Matches the pairs that the memo does not know.
+fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
+    let new: Vec<Vertex> =
+        proposals.iter().map(|p| p.i).filter(|&i| !graph.memo.contains_key(&(i, t))).collect();
+    let here = &graph.place(t).content;
+    let found: Vec<(Vertex, Matched)> = new
+        .par_iter()
+        .map(|&i| {
+            let older = &graph.place(i).content;
+            (i, Matched { modes: modes(older, &Target::wide(older), here) })
+        })
+        .collect();
+    graph.memo.extend(found.into_iter().map(|(i, m)| ((i, t), m)));
+}
+
+/// Where a place `b`, `guess` in the frame of `i`, lies on the old path around `i`: the nearest
+/// place there and the guess in its frame.
+fn nearest_on_path(graph: &Graph, i: Vertex, guess: &Pose2, b: Vertex) -> Option<(Vertex, Pose2)> {
+    graph
+        .along(i, FOLLOW_REACH_M)
+        .filter(|&k| graph.apart(k, b, LOCAL_PATH_M))
+        .map(|k| (k, graph.chained(k, i).compose(guess)))
+        .min_by(|a, b| a.1.x_m.hypot(a.1.y_m).total_cmp(&b.1.x_m.hypot(b.1.y_m)))
+        .filter(|(_, g)| g.x_m.hypot(g.y_m) < FOLLOW_NEAR_M)
+}
+
+/// Where a fit of the place before leads place `t`.
+fn lead(graph: &Graph, fit: &Fit, t: Vertex) -> Option<Lead> {
+    if graph.place(t).chain.broken {
+        return None;
+    }
+    let guess = fit.mode.i_from_j.compose(&graph.chained(t - 1, t));
+    let (i, guess) = nearest_on_path(graph, fit.i, &guess, t)?;
+    Some(Lead { i, guess, from: fit.clone() })
+}
+
+fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
+    let mode = agreeing(graph, lead.i, t, &lead.guess)?;
+    let step_m = (graph.place(t).path_m - graph.place(t - 1).path_m).abs();
+    Some(Fit {
+        i: lead.i,
+        mode,
+        kind: lead.from.kind,
+        support: lead.from.support + 1,
+        support_path_m: lead.from.support_path_m + step_m,
+        age: lead.from.age + 1,
+    })
+}
+
+/// The mode near a guess, if there is a good one that agrees with it.
+fn agreeing(graph: &Graph, i: Vertex, j: Vertex, guess: &Pose2) -> Option<Mode> {
+    let (older, newer) = (&graph.place(i).content, &graph.place(j).content);
+    let mode = refine(older, &Target::near(older), newer, guess)?;
+    let off = guess.between(&mode.i_from_j);
+    (good(&mode) && off.x_m.hypot(off.y_m) < AGREE_M && off.yaw_rad.abs() < AGREE_RAD).then_some(mode)
+}
+
+/// Asks the places before `t` whether they agree with a fit of `t`.
+fn look_back(graph: &Graph, t: Vertex, fit: &mut Fit) {
+    let path_m = graph.place(t).path_m;
+    let (mut support, mut support_path_m) = (1, 0.0);
+    for step in 1..SUPPORT_MIN {
+        let back_m = f64::from(step) * SUPPORT_STEP_M;
+        let Some(b) = graph
+            .along(t, back_m + 2.0 * SUPPORT_STEP_M)
+            .rev()
+            .find(|&b| path_m - graph.place(b).path_m >= back_m)
+        else {
+            break;
+        };
+        let guess = fit.mode.i_from_j.compose(&graph.chained(t, b));
+        let Some((i, guess)) = nearest_on_path(graph, fit.i, &guess, b) else { break };
+        if agreeing(graph, i, b, &guess).is_none() {
+            break;
+        }
+        support += 1;
+        support_path_m = path_m - graph.place(b).path_m;
+    }
+    fit.support = fit.support.max(support);
+    fit.support_path_m = fit.support_path_m.max(support_path_m);
+}
+
+/// One fit per revisit: of those that say the same, semantic ones first (they tie what people
+/// named), else the best; supported ones before others.
+fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
+    fits.sort_by(|a, b| {
+        let rank = |f: &Fit| (f.supported(), f.support, f.kind == EdgeKind::Semantic);
+        rank(b).cmp(&rank(a)).then(b.quality().total_cmp(&a.quality())).then(a.i.cmp(&b.i))
+    });
+    let mut kept: BTreeMap<usize, Fit> = BTreeMap::new();
+    for f in fits {
+        let same = |k: &&mut Fit| {
+            !graph.apart(k.i, f.i, 2.0 * FOLLOW_REACH_M) && {
+                let off = graph.chained(k.i, f.i).compose(&f.mode.i_from_j);
+                let off = k.mode.i_from_j.between(&off);
+                off.x_m.hypot(off.y_m) < 2.0 * AGREE_M && off.yaw_rad.abs() < 2.0 * AGREE_RAD
+            }
+        };
+        match kept.values_mut().find(same) {
+            // The words found it too.
+            Some(k) if f.kind == EdgeKind::Semantic && k.kind != EdgeKind::Semantic => k.kind = f.kind,
+            Some(_) => {}
+            None => {
+                kept.insert(kept.len(), f);
+            }
+        }
+    }
+    kept.into_values().collect()
+}

@@ -1,0 +1,125 @@
+//! Wheel odometry as it comes: repeated and backward stamps, restarts, jumps.
+
+use crate::event::{Odom, StampNs};
+use crate::geometry::{Pose2, wrap};
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// Odometry kept to look back in: some seconds at any usual rate.
+const KEPT: usize = 512;
+/// No robot here drives faster.
+const SPEED_MAX_M_S: f64 = 5.0;
+/// A step this long needs no excuse of time: logs skip, stamps lie.
+const STEP_MAX_M: f64 = 2.0;
+
+/// Recent odometry, in the order of arrival.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Odometry {
+    recent: VecDeque<(StampNs, Pose2)>,
+    boot: u64,
+}
+
+/// What a new odometry pose means.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Step {
+    /// It continues.
+    Continued,
+    /// It restarted or jumped: no motion may be read from it.
+    Broken(String),
+}
+
+impl Odometry {
+    /// Takes a pose in the order of arrival.
+    pub fn push(&mut self, odom: &Odom) -> Step {
+        let step = match self.recent.back() {
+            None => Step::Continued,
+            Some(_) if odom.boot != self.boot => {
+                Step::Broken(format!("boot {} follows boot {}", odom.boot, self.boot))
+            }
+            Some((stamp_ns, last)) => {
+                let dt_s = (odom.stamp_ns - stamp_ns).max(0) as f64 * 1e-9;
+                let d_m = last.distance_m(&odom.odom_from_body);
+                if d_m > STEP_MAX_M + SPEED_MAX_M_S * dt_s {
+                    Step::Broken(format!("odometry jumped by {d_m:.1} m in {dt_s:.2} s"))
+                } else {
+                    Step::Continued
+                }
+            }
+        };
+        if step != Step::Continued {
+            self.recent.clear();
+        }
+        self.boot = odom.boot;
+        self.recent.push_back((odom.stamp_ns, odom.odom_from_body));
+        if self.recent.len() > KEPT {
+            self.recent.pop_front();
+        }
+        step
+    }
+
+    /// Newest stamp, if any.
+    pub fn newest_ns(&self) -> Option<StampNs> {
+        self.recent.back().map(|r| r.0)
+    }
+
+    /// Pose at a stamp: interpolated between the latest-arrived pair that brackets it, else the
+    /// nearer end. None without any odometry.
+    pub fn at(&self, stamp_ns: StampNs) -> Option<Pose2> {
+        let mut later = self.recent.back()?;
+        if later.0 < stamp_ns {
+            return Some(later.1);
+        }
+        for earlier in self.recent.iter().rev() {
+            if earlier.0 == stamp_ns {
+                return Some(earlier.1);
+            }
+            if earlier.0 < stamp_ns && stamp_ns <= later.0 {
+                let f = (stamp_ns - earlier.0) as f64 / (later.0 - earlier.0) as f64;
+                let twist = earlier.1.between(&later.1).log() * f;
+                return Some(earlier.1.compose(&Pose2::exp(&twist)));
+            }
+            later = earlier;
+        }
+        Some(later.1)
+    }
+}
+
+/// Covariance of an odometry increment (right perturbation): generous, for wheels on any floor.
+pub fn increment_covariance(increment: &Pose2) -> Matrix3<f64> {
+    let d_m = increment.x_m.hypot(increment.y_m);
+    let turn_rad = wrap(increment.yaw_rad).abs();
+    let along_m = 0.002 + 0.10 * d_m + 0.02 * turn_rad;
+    let yaw_rad = 0.001 + 0.10 * turn_rad + 0.03 * d_m;
+    Matrix3::from_diagonal(&Vector3::new(along_m.powi(2), along_m.powi(2), yaw_rad.powi(2)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn odom(stamp_ns: i64, x_m: f64, boot: u64) -> Odom {
+        Odom { robot: "r".into(), boot, stamp_ns, odom_from_body: Pose2::new(x_m, 0.0, 0.0) }
+    }
+
+    #[test]
+    fn stamps_may_step_back_and_repeat() {
+        let mut o = Odometry::default();
+        for (t, x) in [(0, 0.0), (100, 1.0), (90, 1.1), (90, 1.2), (200, 2.0)] {
+            assert_eq!(o.push(&odom(t, x, 0)), Step::Continued);
+        }
+        assert!((o.at(145).unwrap().x_m - 1.6).abs() < 1e-9);
+        assert!((o.at(90).unwrap().x_m - 1.2).abs() < 1e-9, "the latest-arrived of equal stamps");
+        assert!((o.at(999).unwrap().x_m - 2.0).abs() < 1e-9);
+        assert!((o.at(-5).unwrap().x_m).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_boot_or_a_jump_breaks_the_segment() {
+        let mut o = Odometry::default();
+        o.push(&odom(0, 0.0, 0));
+        assert!(matches!(o.push(&odom(1_000_000, 9.0, 0)), Step::Broken(_)));
+        assert!(matches!(o.push(&odom(2_000_000, 9.0, 1)), Step::Broken(_)));
+        assert_eq!(o.at(0).unwrap().x_m, 9.0, "what was before the break is forgotten");
+    }
+}

@@ -1,0 +1,141 @@
+//! Step 1 of Algorithm 1: which older places are looked at, eqs. (5–9).
+//!
+//! The draws are common to all particles: particles that agree look at the same places, and each
+//! pair is matched once. A proposal decides only where we look; whether an edge enters a particle
+//! is decided in [`crate::weigh`], where the proposal's probability is accounted for.
+
+use crate::effects::EdgeKind;
+use crate::graph::{Graph, Vertex};
+use crate::labels::Labels;
+use crate::random::{Purpose, uniform};
+use crate::scan::front::LOCAL_PATH_M;
+use crate::smoothing::{Relative, Smoother};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Older places looked at per new place and particle.
+const LOOKED_AT_MAX: usize = 5;
+/// Places proposed are so far apart along the path: their content overlaps otherwise.
+const SPREAD_M: f64 = 2.0;
+/// Beyond, two places' scans hardly overlap, and eq. (6) is small.
+const NEAR_M: f64 = 10.0;
+/// Position uncertainty at which the robot counts as lost.
+pub const LOST_SIGMA_M: f64 = 10.0;
+/// Probability of an edge to any place looked at, when lost.
+pub const RELOCALISATION_P: f64 = 0.2;
+/// Similarities below are chance.
+const SIMILARITY_MIN: f64 = 0.02;
+
+/// A pair to look at.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Proposal {
+    /// The older place.
+    pub i: Vertex,
+    /// By which distribution.
+    pub kind: EdgeKind,
+    /// Its probability there.
+    pub probability: f64,
+}
+
+/// Eqs. (6–7): p(edge) = ∫ 1/(1+γd²) p(d) dd, where d = |x_i⁻¹ x_t| follows a folded Gaussian given
+/// the joint covariance of the two poses.
+pub fn distance_probability(relative: &Relative, gamma_per_m2: f64) -> f64 {
+    let (mean_m, sigma_m) = distance(relative);
+    // Trapezia over ± 3 σ; folding is |d|, and the integrand is even.
+    let (mut sum, mut mass) = (0.0, 0.0);
+    for k in -6..=6 {
+        let s = f64::from(k) * 0.5;
+        let (d, p) = (mean_m + s * sigma_m, (-0.5 * s * s).exp());
+        sum += p / (1.0 + gamma_per_m2 * d * d);
+        mass += p;
+    }
+    sum / mass
+}
+
+/// Mean and standard deviation of the distance between two places, metres.
+pub fn distance(relative: &Relative) -> (f64, f64) {
+    let t = &relative.i_from_a;
+    let mean_m = t.x_m.hypot(t.y_m);
+    // Direction of the translation in the newer place's frame, where the covariance lives.
+    let bearing = t.y_m.atan2(t.x_m) - t.yaw_rad;
+    let (s, c) = bearing.sin_cos();
+    let m = &relative.covariance;
+    let along = c * c * m[(0, 0)] + 2.0 * c * s * m[(0, 1)] + s * s * m[(1, 1)];
+    (mean_m, along.max(0.0).sqrt())
+}
+
+/// What one particle would look at from place `t`: distance edges, semantic edges, and any place
+/// when it is lost. `followed` says which older places are already being followed.
+pub fn propose(
+    seed: u64,
+    gamma_per_m2: f64,
+    graph: &Graph,
+    smoother: &Smoother,
+    labels: &Labels,
+    t: Vertex,
+    followed: impl Fn(Vertex) -> bool,
+) -> Vec<Proposal> {
+    let marginal = smoother.marginal(t);
+    let sigma_m = marginal[(0, 0)].max(marginal[(1, 1)]).sqrt();
+    let older = (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M) && !followed(i));
+    let lost = sigma_m > LOST_SIGMA_M;
+    let here = smoother.pose(t);
+    let within_m = NEAR_M + 3.0 * sigma_m.min(LOST_SIGMA_M);
+    let near: Vec<Vertex> =
+        older.clone().filter(|&i| !lost && smoother.pose(i).distance_m(&here) < within_m).collect();
+    let mut proposals: Vec<Proposal> = smoother
+        .relative(t, &near)
+        .unwrap_or_default()
+        .iter()
+        .map(|r| Proposal { i: r.i, kind: EdgeKind::Distance, probability: distance_probability(r, gamma_per_m2) })
+        .collect();
+    if lost {
+        proposals.extend(older.map(|i| Proposal {
+            i,
+            kind: EdgeKind::Relocalisation,
+            probability: RELOCALISATION_P,
+        }));
+    }
+    merge_semantic(&mut proposals, labels.similar(t), |i| graph.apart(i, t, LOCAL_PATH_M));
+    draw(seed, graph, t, proposals)
+}
+
+/// Eqs. (8–9): where two places are called alike with a greater probability than they are near,
+/// the edge is a semantic one.
+fn merge_semantic(
+    proposals: &mut Vec<Proposal>,
+    similar: BTreeMap<Vertex, f64>,
+    apart: impl Fn(Vertex) -> bool,
+) {
+    for (i, probability) in similar {
+        if probability < SIMILARITY_MIN || !apart(i) {
+            continue;
+        }
+        let semantic = Proposal { i, kind: EdgeKind::Semantic, probability };
+        match proposals.iter_mut().find(|p| p.i == i) {
+            Some(p) if p.probability >= probability => {}
+            Some(p) => *p = semantic,
+            None => proposals.push(semantic),
+        }
+    }
+}
+
+/// An independent draw per older place; of those drawn the likeliest, spread along the path.
+fn draw(seed: u64, graph: &Graph, t: Vertex, proposals: Vec<Proposal>) -> Vec<Proposal> {
+    let mut drawn: Vec<(f64, Proposal)> = proposals
+        .into_iter()
+        .map(|p| (p.probability / uniform(seed, t.into(), p.i.into(), Purpose::Propose).max(1e-9), p))
+        .filter(|(ratio, _)| *ratio > 1.0)
+        .collect();
+    drawn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.i.cmp(&b.1.i)));
+    let mut chosen: Vec<Proposal> = Vec::new();
+    for (_, p) in drawn {
+        if chosen.len() == LOOKED_AT_MAX {
+            break;
+        }
+        if chosen.iter().all(|c| graph.apart(c.i, p.i, SPREAD_M)) {
+            chosen.push(p);
+        }
+    }
+    chosen
+}

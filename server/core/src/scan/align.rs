@@ -1,0 +1,118 @@
+//! Point-to-line registration from a guess (Chen and Medioni 1991; Censi 2008), with a Gaussian
+//! prior and an information matrix.
+//!
+//! Minimises Σ_k ρ(n_kᵀ(X p_k − q_k)) + ‖log(X₀⁻¹X)‖²_P over X = target_from_source, where q_k with
+//! normal n_k is the target's point nearest to X p_k, by iteratively reweighted Gauss–Newton.
+
+use super::cloud::{Index, Point};
+use crate::geometry::Pose2;
+use nalgebra::{Matrix3, Vector3};
+
+/// Standard deviation of a range along the normal, walls' roughness included.
+const SIGMA_M: f64 = 0.03;
+/// Neighbouring beams err together: so many of them count as one.
+const CORRELATED_BEAMS: f64 = 8.0;
+/// Residuals beyond are mostly other things.
+const KERNEL_M: f64 = 0.06;
+/// A pair within this distance along the normal is an inlier.
+const INLIER_M: f64 = 0.10;
+const ITERATIONS_MAX: usize = 25;
+
+/// A Gaussian on the transform sought.
+#[derive(Clone, Copy, Debug)]
+pub struct Prior {
+    /// Its mean.
+    pub target_from_source: Pose2,
+    /// Its information, right perturbation.
+    pub information: Matrix3<f64>,
+}
+
+/// Where a cloud fits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Alignment {
+    /// The transform found.
+    pub target_from_source: Pose2,
+    /// Information that the points alone give on it (no prior), right perturbation.
+    pub information: Matrix3<f64>,
+    /// Share of the source's points that lie on the target's surfaces.
+    pub inlier_share: f64,
+}
+
+/// Registers `source` to `target`. Pairs farther apart than the gate do not count; the gate
+/// shrinks from `gate_m` to a quarter of it. None if too few points pair up.
+pub fn align(
+    source: &[Point],
+    target: &Index,
+    guess: &Pose2,
+    prior: Option<&Prior>,
+    gate_m: f32,
+) -> Option<Alignment> {
+    let mut x = *guess;
+    let mut gate = gate_m;
+    for iteration in 0..ITERATIONS_MAX {
+        let fit = linearise(source, target, &x, gate);
+        if fit.pairs < 10 {
+            return None;
+        }
+        let (mut h, mut g) = (fit.information, fit.gradient);
+        if let Some(p) = prior {
+            let e = p.target_from_source.between(&x).log();
+            h += p.information;
+            g += p.information * e;
+        }
+        // Enough damping to stay put along a bare corridor.
+        let damping = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0)) * 1e-3;
+        let step = -(h + damping).cholesky()?.solve(&g);
+        x = x.compose(&Pose2::exp(&step));
+        let still = step.xy().norm() < 1e-4 && step.z.abs() < 1e-5;
+        if still && gate <= gate_m * 0.26 {
+            break;
+        }
+        if still || iteration % 3 == 2 {
+            gate = (gate * 0.6).max(gate_m * 0.25);
+        }
+    }
+    let fit = linearise(source, target, &x, gate);
+    (fit.pairs >= 10 && x.is_finite()).then(|| Alignment {
+        target_from_source: x,
+        information: fit.information,
+        inlier_share: fit.inliers as f64 / source.len().max(1) as f64,
+    })
+}
+
+struct Fit {
+    information: Matrix3<f64>,
+    gradient: Vector3<f64>,
+    pairs: usize,
+    inliers: usize,
+}
+
+fn linearise(source: &[Point], target: &Index, x: &Pose2, gate_m: f32) -> Fit {
+    let (s, c) = x.yaw_rad.sin_cos();
+    let mut sums = [0.0f64; 9];
+    let (mut pairs, mut inliers) = (0, 0);
+    for p in source {
+        let moved = p.moved(x);
+        let Some(q) = target.nearest(&moved, gate_m) else { continue };
+        let (nx, ny) = (f64::from(q.nx), f64::from(q.ny));
+        let r = nx * f64::from(moved.x - q.x) + ny * f64::from(moved.y - q.y);
+        pairs += 1;
+        inliers += usize::from(r.abs() < INLIER_M);
+        // Geman–McClure weight.
+        let w = (1.0 / (1.0 + (r / KERNEL_M).powi(2))).powi(2);
+        // d(nᵀ X exp(δ) p)/dδ: the normal in the source's frame, and its moment about p.
+        let (a, b) = (c * nx + s * ny, -s * nx + c * ny);
+        let m = b * f64::from(p.x) - a * f64::from(p.y);
+        for (sum, v) in sums.iter_mut().zip([a * a, a * b, a * m, b * b, b * m, m * m, a * r, b * r, m * r]) {
+            *sum += w * v;
+        }
+    }
+    let scale = 1.0 / (SIGMA_M * SIGMA_M * CORRELATED_BEAMS);
+    let [aa, ab, am, bb, bm, mm, ar, br, mr] = sums.map(|v| v * scale);
+    Fit {
+        information: Matrix3::new(aa, ab, am, ab, bb, bm, am, bm, mm),
+        gradient: Vector3::new(ar, br, mr),
+        pairs,
+        inliers,
+    }
+}

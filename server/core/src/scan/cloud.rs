@@ -1,0 +1,166 @@
+//! Sets of points with normals, thinned, and a grid index over them.
+
+use crate::geometry::Pose2;
+use serde::{Deserialize, Serialize};
+
+/// A point of a surface and the unit normal towards where it was seen from; a zero normal: the
+/// surface is not flat there.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Point {
+    /// Metres.
+    pub x: f32,
+    /// Metres.
+    pub y: f32,
+    /// Unit or zero.
+    pub nx: f32,
+    /// Unit or zero.
+    pub ny: f32,
+}
+
+impl Point {
+    /// Whether the surface is flat here.
+    pub fn has_normal(&self) -> bool {
+        self.nx != 0.0 || self.ny != 0.0
+    }
+
+    /// The same point in an outer frame.
+    #[must_use]
+    pub fn moved(&self, outer_from_inner: &Pose2) -> Self {
+        let (s, c) = outer_from_inner.yaw_rad.sin_cos();
+        let (x, y) = (f64::from(self.x), f64::from(self.y));
+        let (nx, ny) = (f64::from(self.nx), f64::from(self.ny));
+        Self {
+            x: (outer_from_inner.x_m + c * x - s * y) as f32,
+            y: (outer_from_inner.y_m + s * x + c * y) as f32,
+            nx: (c * nx - s * ny) as f32,
+            ny: (s * nx + c * ny) as f32,
+        }
+    }
+}
+
+/// One point per voxel and side of a wall: the mean of its points, in the order of voxels.
+pub fn thin(points: &[Point], voxel_m: f32) -> Vec<Point> {
+    let key = |p: &Point| -> u64 {
+        let cell = |v: f32| (((v / voxel_m).floor() as i32).wrapping_add(1 << 24) as u32) & 0x1ff_ffff;
+        (u64::from(cell(p.y)) << 32) | u64::from(cell(p.x))
+    };
+    let mut order: Vec<(u64, u32)> = points.iter().enumerate().map(|(i, p)| (key(p), i as u32)).collect();
+    order.sort_unstable();
+    let mut out = Vec::with_capacity(order.len() / 2);
+    for voxel in order.chunk_by(|a, b| a.0 == b.0) {
+        merge_voxel(voxel.iter().map(|&(_, i)| &points[i as usize]), &mut out);
+    }
+    out
+}
+
+/// Means of the points with a normal, by side, or else of the points without.
+fn merge_voxel<'a>(points: impl Iterator<Item = &'a Point>, out: &mut Vec<Point>) {
+    // Two sides of a thin wall and the rest.
+    let mut sums = [(Point::default(), 0.0f32); 3];
+    for p in points {
+        let slot = if !p.has_normal() {
+            2
+        } else if sums[0].1 == 0.0 || sums[0].0.nx * p.nx + sums[0].0.ny * p.ny > 0.0 {
+            0
+        } else {
+            1
+        };
+        let (sum, n) = &mut sums[slot];
+        sum.x += p.x;
+        sum.y += p.y;
+        sum.nx += p.nx;
+        sum.ny += p.ny;
+        *n += 1.0;
+    }
+    let flat = sums[0].1 > 0.0;
+    for (sum, n) in sums {
+        if n == 0.0 || (!sum.has_normal() && flat) {
+            continue;
+        }
+        let norm = sum.nx.hypot(sum.ny);
+        let unit = if norm > 0.0 { 1.0 / norm } else { 0.0 };
+        out.push(Point { x: sum.x / n, y: sum.y / n, nx: sum.nx * unit, ny: sum.ny * unit });
+    }
+}
+
+/// Points sorted into the cells of a grid, for nearest-neighbour look-ups.
+#[derive(Clone, Debug)]
+pub struct Index {
+    points: Vec<Point>,
+    /// Start of each cell's points; one more than there are cells.
+    starts: Vec<u32>,
+    x0: f32,
+    y0: f32,
+    inv_cell: f32,
+    width: i32,
+    height: i32,
+}
+
+impl Index {
+    /// Indexes the points that have normals. `cell_m` is the largest gate of a look-up.
+    pub fn new(points: &[Point], cell_m: f32) -> Self {
+        let flat = || points.iter().filter(|p| p.has_normal());
+        let (mut x0, mut y0, mut x1, mut y1) = (f32::MAX, f32::MAX, f32::MIN, f32::MIN);
+        for p in flat() {
+            (x0, y0, x1, y1) = (x0.min(p.x), y0.min(p.y), x1.max(p.x), y1.max(p.y));
+        }
+        if x0 > x1 {
+            (x0, y0, x1, y1) = (0.0, 0.0, 0.0, 0.0);
+        }
+        let inv_cell = 1.0 / cell_m;
+        let (width, height) = (((x1 - x0) * inv_cell) as i32 + 1, ((y1 - y0) * inv_cell) as i32 + 1);
+        let cell_of =
+            |p: &Point| (((p.y - y0) * inv_cell) as i32 * width + ((p.x - x0) * inv_cell) as i32) as usize;
+        let mut starts = vec![0u32; (width * height) as usize + 1];
+        for p in flat() {
+            starts[cell_of(p) + 1] += 1;
+        }
+        for c in 1..starts.len() {
+            starts[c] += starts[c - 1];
+        }
+        let mut next = starts.clone();
+        let mut sorted = vec![Point::default(); *starts.last().unwrap_or(&0) as usize];
+        for p in flat() {
+            let slot = &mut next[cell_of(p)];
+            sorted[*slot as usize] = *p;
+            *slot += 1;
+        }
+        Self { points: sorted, starts, x0, y0, inv_cell, width, height }
+    }
+
+    /// Number of points.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.points.is_empty()
+    }
+
+    /// The nearest point within `gate_m` (at most the cell) whose normal agrees with `p`'s to 45°.
+    pub fn nearest(&self, p: &Point, gate_m: f32) -> Option<&Point> {
+        let (cx, cy) = ((p.x - self.x0) * self.inv_cell, (p.y - self.y0) * self.inv_cell);
+        if !(cx > -2.0 && cy > -2.0 && cx < 1e6 && cy < 1e6) {
+            return None;
+        }
+        // Only cells that the gate's square touches.
+        let reach = gate_m * self.inv_cell;
+        let (c0, c1) = ((cx - reach).floor().max(0.0) as i32, ((cx + reach) as i32).min(self.width - 1));
+        let (r0, r1) = ((cy - reach).floor().max(0.0) as i32, ((cy + reach) as i32).min(self.height - 1));
+        let (mut best, mut best_d2) = (None, gate_m * gate_m);
+        let mut row = r0;
+        while row <= r1 && c0 <= c1 {
+            let first = self.starts[(row * self.width + c0) as usize] as usize;
+            let last = self.starts[(row * self.width + c1) as usize + 1] as usize;
+            for q in &self.points[first..last] {
+                let d2 = (q.x - p.x).powi(2) + (q.y - p.y).powi(2);
+                if d2 < best_d2 && (!p.has_normal() || q.nx * p.nx + q.ny * p.ny > 0.7) {
+                    (best, best_d2) = (Some(q), d2);
+                }
+            }
+            row += 1;
+        }
+        best
+    }
+}

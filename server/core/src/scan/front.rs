@@ -1,0 +1,334 @@
+//! The front end: every scan against the recent ones, shared by all particles.
+//!
+//! An iterated Kalman filter on the body's pose in a local map: odometry predicts, registration
+//! to the scans of the last metres of path corrects. Its frame drifts; only its increments are
+//! used: the chain edges between successive places and each scan's pose in its place.
+
+use super::align::{Alignment, Prior, align};
+use super::cloud::{Index, Point, thin};
+use super::place::{Content, VOXEL_M};
+use super::sweep::Sweep;
+use crate::effects::PlaceId;
+use crate::event::StampNs;
+use crate::geometry::{Pose2, wrap};
+use crate::odometry::increment_covariance;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// The local map reaches back so far along the path; nearer places are no loop candidates.
+pub const LOCAL_PATH_M: f64 = 10.0;
+/// A place's content reaches so far to either side along the path.
+const CONTENT_REACH_M: f64 = 2.5;
+/// A scan becomes part of the local map after so much motion.
+const KEY_STEP_M: f64 = 0.25;
+const KEY_TURN_RAD: f64 = 0.35;
+/// Scans in the local map.
+const KEYS_MAX: usize = 60;
+/// Largest distance between a point and its surface when registration begins.
+const GATE_M: f32 = 0.6;
+/// Share of a scan's points on known surfaces below which the fit is looked at twice.
+const SHARE_SURE: f64 = 0.6;
+/// Below it the scan says nothing about the pose.
+const SHARE_MIN: f64 = 0.25;
+/// After a break of odometry a scan must fit so well for the track to go on.
+const SHARE_RESUME: f64 = 0.8;
+/// Wheels err with a bias (a scale, a bent axle), and fused at each scan a bias adds up: odometry
+/// decides only where the scans say next to nothing.
+const ODOMETRY_TRUST: f64 = 0.02;
+/// What the local map itself may be wrong by.
+const MAP_SIGMA_M: f64 = 0.005;
+const MAP_SIGMA_RAD: f64 = 0.002;
+
+/// A scan in the local map.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Key {
+    front_from_body: Pose2,
+    path_m: f64,
+    sweep: Sweep,
+}
+
+/// A place whose surroundings are still being seen.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct OpenPlace {
+    /// Its id.
+    pub id: PlaceId,
+    /// Stamp of its first scan.
+    pub stamp_ns: StampNs,
+    /// Its frame in the front end's.
+    pub front_from_place: Pose2,
+    /// Path travelled when it began.
+    pub path_m: f64,
+    /// The chain edge from the place before.
+    pub chain: Chain,
+}
+
+/// The edge from a place to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Chain {
+    /// The next place in the frame of the one before.
+    pub previous_from_this: Pose2,
+    /// Its information, right perturbation.
+    pub information: Matrix3<f64>,
+    /// Whether odometry broke between the two: they are tied by next to nothing.
+    pub broken: bool,
+}
+
+/// A place that is left behind: it may now be matched.
+#[derive(Clone, Debug)]
+pub struct FrozenPlace {
+    /// Id, stamp, frame, chain.
+    pub open: OpenPlace,
+    /// What it looks like.
+    pub content: Content,
+}
+
+/// What became of a scan.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// The place held.
+    pub place: PlaceId,
+    /// The body in its frame.
+    pub place_from_body: Pose2,
+    /// Whether the place began with this scan.
+    pub began: bool,
+    /// Places that this scan froze, oldest first.
+    pub frozen: Vec<FrozenPlace>,
+}
+
+/// State of the front end.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrontEnd {
+    spacing_m: f64,
+    next_place: PlaceId,
+    front_from_body: Pose2,
+    odom_from_body: Option<Pose2>,
+    path_m: f64,
+    /// Covariance of the pose in the local map.
+    in_map: Matrix3<f64>,
+    /// Covariance of the pose relative to the last place.
+    since_place: Matrix3<f64>,
+    /// Odometry broke: the next scan decides whether the track goes on.
+    broken: bool,
+    keys: VecDeque<Key>,
+    open: VecDeque<OpenPlace>,
+    /// Index of the local map; a function of `keys`.
+    #[serde(skip)]
+    local: Option<Index>,
+}
+
+impl FrontEnd {
+    /// An empty track; a place each `spacing_m` of path.
+    pub fn new(spacing_m: f64) -> Self {
+        Self {
+            spacing_m,
+            next_place: 0,
+            front_from_body: Pose2::default(),
+            odom_from_body: None,
+            path_m: 0.0,
+            in_map: Matrix3::zeros(),
+            since_place: Matrix3::zeros(),
+            broken: false,
+            keys: VecDeque::new(),
+            open: VecDeque::new(),
+            local: None,
+        }
+    }
+
+    /// Odometry restarted or jumped: the next increment means nothing.
+    pub fn break_odometry(&mut self) {
+        self.broken = self.odom_from_body.is_some();
+    }
+
+    /// Places not yet frozen, oldest first.
+    pub fn open_places(&self) -> impl Iterator<Item = &OpenPlace> {
+        self.open.iter()
+    }
+
+    /// The body in the front end's frame.
+    pub fn front_from_body(&self) -> Pose2 {
+        self.front_from_body
+    }
+
+    /// Covariance of the body relative to the place held.
+    pub fn since_place(&self) -> Matrix3<f64> {
+        self.since_place
+    }
+
+    /// Takes a scan with the odometry at its stamp.
+    pub fn scan(&mut self, stamp_ns: StampNs, odom_from_body: Pose2, sweep: Sweep) -> Placed {
+        let mut frozen = Vec::new();
+        if std::mem::take(&mut self.broken) {
+            if !self.resume(&sweep) {
+                frozen = self.start_over();
+            }
+        } else if let Some(before) = self.odom_from_body {
+            self.predict(&before.between(&odom_from_body));
+            self.correct(&sweep);
+        }
+        self.odom_from_body = Some(odom_from_body);
+        let began = self.keep_place(stamp_ns);
+        self.keep_key(sweep);
+        frozen.extend(self.freeze(self.path_m - CONTENT_REACH_M));
+        let (place, place_from_body) = self
+            .open
+            .back()
+            .map_or((0, Pose2::default()), |p| (p.id, p.front_from_place.between(&self.front_from_body)));
+        Placed { place, place_from_body, began, frozen }
+    }
+
+    /// Freezes every place that began at or before a point of the path.
+    pub fn freeze(&mut self, path_m: f64) -> Vec<FrozenPlace> {
+        let mut frozen = Vec::new();
+        // The place held must stay, to hold the next scans.
+        while self.open.front().is_some_and(|p| p.path_m <= path_m) && (self.open.len() > 1 || path_m == f64::INFINITY) {
+            let Some(open) = self.open.pop_front() else { break };
+            let near = |k: &&Key| (k.path_m - open.path_m).abs() <= CONTENT_REACH_M;
+            let sweeps: Vec<(Pose2, &Sweep)> = self
+                .keys
+                .iter()
+                .filter(near)
+                .map(|k| (open.front_from_place.between(&k.front_from_body), &k.sweep))
+                .collect();
+            let content = Content::new(&sweeps);
+            frozen.push(FrozenPlace { open, content });
+        }
+        frozen
+    }
+
+    fn predict(&mut self, increment: &Pose2) {
+        let f = increment.inverse().adjoint();
+        let q = increment_covariance(increment);
+        self.in_map = f * self.in_map * f.transpose() + q;
+        self.since_place = f * self.since_place * f.transpose() + q;
+        self.front_from_body = self.front_from_body.compose(increment);
+        self.path_m += increment.x_m.hypot(increment.y_m);
+    }
+
+    /// Registers the scan to the local map around the prediction; what it says is fused.
+    fn correct(&mut self, sweep: &Sweep) {
+        let Some(information) = self.in_map.try_inverse() else { return };
+        let prior =
+            Prior { target_from_source: self.front_from_body, information: information * ODOMETRY_TRUST };
+        let points = thin(&sweep.points, VOXEL_M);
+        let Some(found) = self.register(&points, &prior) else { return };
+        self.front_from_body = found.target_from_source;
+        let map = Matrix3::from_diagonal(&Vector3::new(
+            MAP_SIGMA_M.powi(2),
+            MAP_SIGMA_M.powi(2),
+            MAP_SIGMA_RAD.powi(2),
+        ));
+        let fuse = |p: &Matrix3<f64>| -> Option<Matrix3<f64>> {
+            (p.try_inverse()? + found.information).try_inverse().map(|m| (m + m.transpose()) * 0.5 + map)
+        };
+        self.in_map = fuse(&self.in_map).unwrap_or(self.in_map);
+        self.since_place = fuse(&self.since_place).unwrap_or(self.since_place);
+    }
+
+    fn register(&mut self, points: &[Point], prior: &Prior) -> Option<Alignment> {
+        let guess = prior.target_from_source;
+        let local = self.local();
+        let mut best = align(points, local, &guess, Some(prior), GATE_M);
+        if best.is_none_or(|b| b.inlier_share < SHARE_SURE) {
+            // A fast turn or a slip: start from other headings too.
+            for turn_rad in [-0.1, 0.1, -0.2, 0.2, -0.35, 0.35] {
+                let turned = guess.compose(&Pose2::new(0.0, 0.0, turn_rad));
+                let other = align(points, local, &turned, Some(prior), GATE_M);
+                if let Some(o) = other
+                    && best.is_none_or(|b| o.inlier_share > b.inlier_share + 0.05)
+                {
+                    best = other;
+                }
+            }
+        }
+        best.filter(|b| b.inlier_share >= SHARE_MIN)
+    }
+
+    /// After a break: is the robot still where it was?
+    fn resume(&mut self, sweep: &Sweep) -> bool {
+        let points = thin(&sweep.points, VOXEL_M);
+        let wide = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
+        let here = self.front_from_body;
+        let local = self.local();
+        let found = (0..18)
+            .filter_map(|k| {
+                let guess = here.compose(&Pose2::new(0.0, 0.0, f64::from(k) * 0.35));
+                let prior = Prior { target_from_source: guess, information: wide };
+                align(&points, local, &guess, Some(&prior), GATE_M)
+            })
+            .max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
+        let Some(found) = found.filter(|f| f.inlier_share >= SHARE_RESUME) else { return false };
+        self.front_from_body = found.target_from_source;
+        true
+    }
+
+    /// The link to what was is lost: a new local map, and a chain edge that says nothing.
+    fn start_over(&mut self) -> Vec<FrozenPlace> {
+        let frozen = self.freeze(f64::INFINITY);
+        self.keys.clear();
+        self.local = None;
+        // Far enough that nothing of the old map is taken for part of the new local one.
+        self.path_m += 2.0 * LOCAL_PATH_M;
+        self.in_map = Matrix3::zeros();
+        self.since_place = Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0));
+        frozen
+    }
+
+    /// Begins a place where the last one is far enough behind.
+    fn keep_place(&mut self, stamp_ns: StampNs) -> bool {
+        let broken = self.keys.is_empty() && self.next_place > 0;
+        let last = self.open.back();
+        if last.is_some_and(|p| self.path_m - p.path_m < self.spacing_m) {
+            return false;
+        }
+        let previous_from_this =
+            last.map_or(Pose2::default(), |p| p.front_from_place.between(&self.front_from_body));
+        let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
+        // The local map bends slowly, whatever registration says of one scan.
+        let bend = Matrix3::from_diagonal(&Vector3::new(
+            (0.005 + 0.01 * d_m).powi(2),
+            (0.005 + 0.01 * d_m).powi(2),
+            (0.002 + 0.003 * d_m).powi(2),
+        ));
+        let information = (self.since_place + bend).try_inverse().unwrap_or_else(Matrix3::identity);
+        let chain = Chain { previous_from_this, information, broken };
+        self.open.push_back(OpenPlace {
+            id: self.next_place,
+            stamp_ns,
+            front_from_place: self.front_from_body,
+            path_m: self.path_m,
+            chain,
+        });
+        self.next_place += 1;
+        self.since_place = Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-6, 1e-7));
+        true
+    }
+
+    /// Adds the scan to the local map if it shows it from a new pose.
+    fn keep_key(&mut self, sweep: Sweep) {
+        let near = |k: &Key| {
+            k.front_from_body.distance_m(&self.front_from_body) < KEY_STEP_M
+                && wrap(k.front_from_body.yaw_rad - self.front_from_body.yaw_rad).abs() < KEY_TURN_RAD
+        };
+        if sweep.points.is_empty() || self.keys.iter().rev().take(KEYS_MAX / 2).any(near) {
+            return;
+        }
+        self.keys.push_back(Key { front_from_body: self.front_from_body, path_m: self.path_m, sweep });
+        let keep_from_m = self.path_m - LOCAL_PATH_M;
+        while self.keys.len() > KEYS_MAX || self.keys.front().is_some_and(|k| k.path_m < keep_from_m) {
+            self.keys.pop_front();
+        }
+        self.local = None;
+    }
+
+    fn local(&mut self) -> &Index {
+        let keys = &self.keys;
+        self.local.get_or_insert_with(|| {
+            let all: Vec<Point> = keys
+                .iter()
+                .flat_map(|k| k.sweep.points.iter().map(|p| p.moved(&k.front_from_body)))
+                .collect();
+            Index::new(&thin(&all, VOXEL_M), GATE_M)
+        })
+    }
+}

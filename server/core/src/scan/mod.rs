@@ -1,0 +1,19 @@
+//! Laser scans: from beams to points, from points to transforms between places.
+//!
+//! - [`sweep`]: one scan, de-skewed, as points with normals and as a range image.
+//! - [`cloud`]: sets of points and their spatial index.
+//! - [`align`]: point-to-line registration from a guess, with an information matrix.
+//! - [`correlate`]: prior-free search for all transforms under which two clouds overlap.
+//! - [`agree`]: do two places see each other's walls, or through them?
+//! - [`front`]: the front end, every scan against the recent ones.
+//! - [`place`]: a place's matchable content, frozen when the robot has left it.
+//! - [`matching`]: two places' scans to modes; the measurement behind every loop edge.
+
+pub mod agree;
+pub mod align;
+pub mod cloud;
+pub mod correlate;
+pub mod front;
+pub mod matching;
+pub mod place;
+pub mod sweep;

@@ -1,0 +1,183 @@
+//! One sweep of a laser: validated, de-skewed, in the body frame at the reference time.
+
+use super::cloud::Point;
+use crate::event::{Laser, Scan};
+use crate::geometry::Pose2;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{PI, TAU};
+
+/// Returns beyond are too sparse to match and noisier than the map.
+const RANGE_USED_MAX_M: f64 = 30.0;
+/// Beams on either side that a normal is fitted to.
+const NORMAL_REACH: usize = 3;
+/// A normal needs neighbours this near (plus what the beam spacing explains).
+const NORMAL_GAP_M: f64 = 0.12;
+/// Thickness over length of a neighbourhood that still counts as a line.
+const NORMAL_FLATNESS_MAX: f64 = 0.25;
+/// Bins of a range image.
+const BINS: usize = 360;
+
+/// A sweep in the body frame at its reference time (that of its first ray).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sweep {
+    /// What was hit, with normals towards the laser where the surface is flat.
+    pub points: Vec<Point>,
+    /// How far the laser saw in each direction.
+    pub image: RangeImage,
+}
+
+/// How far a laser saw, by bearing: the map's free space in 1.4 kB.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RangeImage {
+    /// The laser in the body frame.
+    pub body_from_laser: Pose2,
+    /// Nearest return per bin of 1° from −π; NaN where nothing is known.
+    nearest_m: Vec<f32>,
+    /// Farthest return per bin.
+    farthest_m: Vec<f32>,
+}
+
+impl RangeImage {
+    /// Nearest and farthest return at a bearing (laser frame), looking one bin to either side;
+    /// none where the laser has no information.
+    pub fn at(&self, bearing_rad: f64) -> Option<(f64, f64)> {
+        let centre = bin(bearing_rad);
+        let (mut near, mut far) = (f32::INFINITY, f32::NEG_INFINITY);
+        for k in [centre + BINS - 1, centre, centre + 1] {
+            near = near.min(self.nearest_m[k % BINS]);
+            far = far.max(self.farthest_m[k % BINS]);
+        }
+        (near.is_finite() && !self.nearest_m[centre].is_nan()).then(|| (f64::from(near), f64::from(far)))
+    }
+}
+
+impl RangeImage {
+    /// Bearing and range of every ray that hit something, laser frame.
+    pub fn rays(&self) -> impl Iterator<Item = (f64, f64)> + '_ {
+        let bearing = |k: usize| (k as f64 + 0.5) * (TAU / BINS as f64) - PI;
+        self.nearest_m
+            .iter()
+            .enumerate()
+            .filter(|(_, r)| r.is_finite())
+            .map(move |(k, r)| (bearing(k), f64::from(*r)))
+    }
+}
+
+fn bin(bearing_rad: f64) -> usize {
+    (((bearing_rad + PI).rem_euclid(TAU)) * (BINS as f64 / TAU)) as usize % BINS
+}
+
+/// A ray that hit something: laser frame at the reference time.
+struct Hit {
+    x_m: f64,
+    y_m: f64,
+    beam: usize,
+}
+
+/// Makes a sweep of a scan. `motion(dt_s)` is the body's pose `dt_s` after the first ray, in the
+/// body frame at the first ray; it de-skews scans whose `time_increment_s` is not zero.
+pub fn sweep(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Sweep {
+    let hits = hits(scan, laser, motion);
+    let step_rad = scan.angle_increment_rad.abs();
+    let image = image(&hits, laser, step_rad);
+    let points = (0..hits.len())
+        .map(|k| {
+            let (nx, ny) = normal(&hits, k, step_rad);
+            let (x, y) = laser.body_from_laser.apply(hits[k].x_m, hits[k].y_m);
+            let (s, c) = laser.body_from_laser.yaw_rad.sin_cos();
+            Point { x: x as f32, y: y as f32, nx: (c * nx - s * ny) as f32, ny: (s * nx + c * ny) as f32 }
+        })
+        .collect();
+    Sweep { points, image }
+}
+
+fn hits(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Vec<Hit> {
+    let far = laser.range_max_m.min(RANGE_USED_MAX_M);
+    let laser_from_body = laser.body_from_laser.inverse();
+    let sign = if laser.upside_down { -1.0 } else { 1.0 };
+    let mut hits = Vec::with_capacity(scan.ranges_m.len());
+    for (beam, &range) in scan.ranges_m.iter().enumerate() {
+        let range = f64::from(range);
+        let bearing = scan.angle_min_rad + beam as f64 * scan.angle_increment_rad;
+        // NaN fails every comparison.
+        if !(range >= laser.range_min_m && range < far) || ignored(laser, bearing) {
+            continue;
+        }
+        let (s, c) = (sign * bearing).sin_cos();
+        let (mut x_m, mut y_m) = (range * c, range * s);
+        if scan.time_increment_s > 0.0 {
+            let moved = motion(beam as f64 * scan.time_increment_s);
+            let (bx, by) = laser.body_from_laser.apply(x_m, y_m);
+            let (bx, by) = moved.apply(bx, by);
+            (x_m, y_m) = laser_from_body.apply(bx, by);
+        }
+        hits.push(Hit { x_m, y_m, beam });
+    }
+    hits
+}
+
+fn ignored(laser: &Laser, bearing_rad: f64) -> bool {
+    laser.ignored_rad.iter().any(|(from, to)| (bearing_rad - from).rem_euclid(TAU) <= (to - from).rem_euclid(TAU))
+}
+
+/// Total least squares over neighbouring beams, oriented towards the laser; zero where the
+/// neighbourhood is not a line.
+fn normal(hits: &[Hit], k: usize, step_rad: f64) -> (f64, f64) {
+    let here = &hits[k];
+    let range_m = here.x_m.hypot(here.y_m);
+    // Three beams' spacing on a wall seen at 20° of incidence or more.
+    let gap_m = NORMAL_GAP_M + 3.0 * range_m * step_rad.min(0.1);
+    let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
+    let mut add = |h: &Hit| {
+        let (x, y) = (h.x_m - here.x_m, h.y_m - here.y_m);
+        n += 1.0;
+        sx += x;
+        sy += y;
+        sxx += x * x;
+        sxy += x * y;
+        syy += y * y;
+    };
+    add(here);
+    for ahead in [true, false] {
+        let mut last = here;
+        for step in 1..=NORMAL_REACH {
+            let Some(i) = (if ahead { Some(k + step) } else { k.checked_sub(step) }) else { break };
+            let Some(h) = hits.get(i) else { break };
+            if h.beam.abs_diff(here.beam) > NORMAL_REACH + 1 || (h.x_m - last.x_m).hypot(h.y_m - last.y_m) > gap_m {
+                break;
+            }
+            add(h);
+            last = h;
+        }
+    }
+    if n < 3.0 {
+        return (0.0, 0.0);
+    }
+    let (cxx, cxy, cyy) = (sxx - sx * sx / n, sxy - sx * sy / n, syy - sy * sy / n);
+    let (mean, half) = ((cxx + cyy) / 2.0, ((cxx - cyy) / 2.0).hypot(cxy));
+    if mean + half < 1e-8 || ((mean - half).max(0.0) / (mean + half)).sqrt() > NORMAL_FLATNESS_MAX {
+        return (0.0, 0.0);
+    }
+    // Direction of the line is half the angle of (cxx − cyy, 2 cxy); the normal is across.
+    let along = 0.5 * (2.0 * cxy).atan2(cxx - cyy);
+    let (nx, ny) = (-along.sin(), along.cos());
+    let sign = if nx * here.x_m + ny * here.y_m > 0.0 { -1.0 } else { 1.0 };
+    (sign * nx, sign * ny)
+}
+
+fn image(hits: &[Hit], laser: &Laser, step_rad: f64) -> RangeImage {
+    let mut nearest_m = vec![f32::NAN; BINS];
+    let mut farthest_m = vec![f32::NAN; BINS];
+    // A beam stands for half its spacing to either side.
+    let reach = ((step_rad / 2.0) * (BINS as f64 / TAU)).ceil() as usize;
+    for h in hits {
+        let range = h.x_m.hypot(h.y_m) as f32;
+        let centre = bin(h.y_m.atan2(h.x_m));
+        for k in centre + BINS - reach.min(BINS / 2)..=centre + BINS + reach.min(BINS / 2) {
+            // f32::min and max pass over NaN.
+            nearest_m[k % BINS] = nearest_m[k % BINS].min(range);
+            farthest_m[k % BINS] = farthest_m[k % BINS].max(range);
+        }
+    }
+    RangeImage { body_from_laser: laser.body_from_laser, nearest_m, farthest_m }
+}
