@@ -62,10 +62,14 @@ fn this_is(at: &mut Cursor) -> Option<(NounPhrase, bool)> {
 
 /// "We are back in the gym".
 fn we_are_in(at: &mut Cursor) -> Option<(NounPhrase, bool)> {
-    at.eat_any(
+    let who = at.eat_any(
         "here we are|now we are|we are|you are|i am|we have arrived|we have now arrived|we have just arrived|\
         we just arrived|you have arrived|we have come",
-    )?;
+    );
+    // "Back at the lobby" does without.
+    if who.is_none() && at.peek(0) != "back" {
+        return None;
+    }
     let (mut back, mut inside) = (false, false);
     loop {
         if at.eat_any("back|again|once again|still").is_some() {
@@ -77,7 +81,7 @@ fn we_are_in(at: &mut Cursor) -> Option<(NounPhrase, bool)> {
         }
     }
     let on = at.eat("on");
-    if !(on || inside || at.eat_any("in|at|by").is_some()) {
+    if !(on || inside || at.eat_any("in|at|by").is_some() || (back && who.is_some() && at.eat("to"))) {
         return None;
     }
     // "On the terrace", but not "on the same page".
@@ -89,9 +93,10 @@ fn named(at: &mut Cursor) -> Option<NounPhrase> {
     at.noun_phrase().filter(|p| p.kind != Kind::No && p.determiner != Determiner::Demonstrative)
 }
 
-/// A known kind of place, or anything definite: an unknown thing ("a test") names no place.
+/// A known kind of place, or any definite single thing: unknown things ("a test", "the results") name
+/// no place.
 fn plausible(phrase: &NounPhrase) -> bool {
-    phrase.kind == Kind::Place || phrase.determiner == Determiner::Definite
+    phrase.kind == Kind::Place || (phrase.determiner == Determiner::Definite && !phrase.plural)
 }
 
 #[cfg(test)]
@@ -137,6 +142,8 @@ mod tests {
     fn sameness_is_heard() {
         for text in [
             "We're back in the lobby",
+            "back at the lobby",
+            "we have come back to the lobby",
             "this is the lobby again",
             "once again this is the lobby",
             "we are in the lobby once more",

@@ -66,9 +66,9 @@ impl Name {
             return if numbered || told { Kind::Place } else { Kind::No };
         }
         let late_gerund = words.iter().skip(1).any(|w| w.ends_with("ing"));
-        let unlikely = words.iter().any(|w| is_not_a_place(w.trim_end_matches("'s")));
-        let odd =
-            unlikely || late_gerund || words.len() > 4 || noun.len() < 3 || is_weak(noun) || is_praise(noun);
+        // "The only parameter" is no place, nor is "the stock market's end".
+        let unlikely = words.iter().any(|w| is_weak(w) || is_not_a_place(w.trim_end_matches("'s")));
+        let odd = unlikely || late_gerund || words.len() > 4 || noun.len() < 3 || is_praise(noun);
         if odd { Kind::No } else { Kind::Open }
     }
 

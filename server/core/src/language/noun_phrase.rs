@@ -11,13 +11,13 @@ use super::normalise::COMMA;
 pub(super) enum Determiner {
     /// "kitchen", "Nick's office".
     None,
-    /// "the kitchen", "our kitchen".
+    /// "the kitchen".
     Definite,
     /// "a kitchen".
     Indefinite,
     /// "this kitchen".
     Demonstrative,
-    /// "my office".
+    /// "my office", "our kitchen".
     Possessive,
 }
 
@@ -103,10 +103,10 @@ impl<'a> Cursor<'a> {
             ("yet another|another|a different|a second|a third|one more", Indefinite, Sameness::Other),
             ("the other", Definite, Sameness::Other),
             ("the same|that same|our same", Definite, Sameness::Same),
-            ("the|our", Definite, Sameness::Open),
+            ("the", Definite, Sameness::Open),
             ("a|an|some", Indefinite, Sameness::Open),
             ("this|that|these|those", Demonstrative, Sameness::Open),
-            ("my|your|his|her|their", Possessive, Sameness::Open),
+            ("our|my|your|his|her|their", Possessive, Sameness::Open),
         ];
         let found = begins.into_iter().find(|(phrases, ..)| self.eat_any(phrases).is_some());
         found.map_or((None, Sameness::Open), |(_, determiner, again)| (determiner, again))
