@@ -1,7 +1,9 @@
 //! What words are: a name is plausible as a place if its head noun is known, or if it is definite
 //! ("the mural") and nothing speaks against it: the vocabulary stays open.
 
-use super::word_lists::{COMPOUNDS, FUNCTION_WORDS, GENERIC, KEEP_S, LY_NOUNS, NOT_PLACES, PLACES, PRAISE, WEAK};
+use super::word_lists::{
+    COMPOUNDS, FUNCTION_WORDS, GENERIC, KEEP_S, LY_NOUNS, NOT_PLACES, PLACES, PRAISE, WEAK,
+};
 
 /// Spellings and words that mean the same wherever they stand in a name.
 const SAME_WORD: &[(&str, &str)] = &[
@@ -93,7 +95,7 @@ pub(super) fn is_weak(word: &str) -> bool {
 pub(super) fn is_disqualified(word: &str) -> bool {
     matches!(
         word,
-        "wrong" | "fake" | "former" | "future" | "next" | "previous" | "possible" | "potential" | "imaginary" | "so"
+        "wrong" | "fake" | "former" | "future" | "next" | "previous" | "possible" | "potential" | "imaginary"
     )
 }
 
@@ -105,9 +107,8 @@ pub(super) fn is_praise(word: &str) -> bool {
 /// Does this noun speak against a place: a person, a time, an abstraction, a movable?
 pub(super) fn is_not_a_place(word: &str) -> bool {
     // Abstract nouns and superlatives, recognised by their endings.
-    const ABSTRACT: [&str; 13] = [
-        "tion", "sion", "ment", "ness", "ity", "ism", "ance", "ence", "ship", "hood", "dom", "ology", "est",
-    ];
+    const ABSTRACT: [&str; 13] =
+        ["tion", "sion", "ment", "ness", "ity", "ism", "ance", "ence", "ship", "hood", "dom", "ology", "est"];
     listed(NOT_PLACES, word)
         || is_adverb(word)
         || (word.len() > 5 && ABSTRACT.iter().any(|end| word.ends_with(end)))
@@ -139,8 +140,9 @@ pub(super) fn apart(word: &str) -> Option<&'static [&'static str]> {
 
 /// The singular of a head noun. Taught and asked names both pass here, so that they meet.
 pub(super) fn singular(word: &str) -> String {
-    let keeps =
-        word.len() < 4 || listed(KEEP_S, word) || ["ss", "us", "is", "'s"].iter().any(|end| word.ends_with(end));
+    let keeps = word.len() < 4
+        || listed(KEEP_S, word)
+        || ["ss", "us", "is", "'s"].iter().any(|end| word.ends_with(end));
     if keeps || !word.ends_with('s') {
         return word.to_owned();
     }
