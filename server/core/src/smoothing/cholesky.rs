@@ -9,7 +9,6 @@ const NONE: u32 = u32::MAX;
 
 /// A symmetric block matrix with the structure of its own factor, lower triangle, elimination
 /// order.
-#[derive(Clone)]
 pub(super) struct Blocks {
     pub diagonal: Vec<Matrix3<f64>>,
     /// In the order of [`Symbolic::row`]; zero where the factor fills in.
@@ -36,15 +35,10 @@ pub(super) struct Cholesky {
 }
 
 impl Cholesky {
-    /// Factorises `h`, its diagonal entries raised by the share `damping` (Marquardt).
-    ///
-    /// Left-looking: column j takes what every earlier column k with a block in row j owes it.
-    pub fn factorise(symbolic: &Symbolic, h: &Blocks, damping: f64) -> Result<Self, SmoothError> {
+    /// Factorises `h`, left-looking: column j takes what every earlier column k with a block in row j owes it.
+    pub fn factorise(symbolic: &Symbolic, h: Blocks) -> Result<Self, SmoothError> {
         let n = symbolic.columns();
-        let Blocks { mut diagonal, mut below } = h.clone();
-        for block in &mut diagonal {
-            (0..3).for_each(|i| block[(i, i)] *= 1.0 + damping);
-        }
+        let Blocks { mut diagonal, mut below } = h;
         let mut diagonal_inverse = Vec::with_capacity(n);
         let mut slot_of_row = vec![0_u32; n];
         // Columns whose next unused block lies in a given row, as linked lists.

@@ -16,7 +16,7 @@
 //! | symbol | meaning | where |
 //! |---|---|---|
 //! | z_k, Ω_k, J_k | a between-factor, its information, its Jacobian | [`factor`] |
-//! | X* | Gauss–Newton with Marquardt's damping | `solve` |
+//! | X* | Gauss–Newton with a line search | `solve` |
 //! | Λ = L Lᵀ | sparse Cholesky in 3×3 blocks, minimum-degree order, newest pose last | `symbolic`, `cholesky` |
 //! | Σ_jj, Σ_tj | selected inverse, back-substitution | `covariance` |
 //!

@@ -1,10 +1,13 @@
 //! The smoother against a dense batch solution with numerical Jacobians.
 
 use super::*;
-use nalgebra::{DMatrix, DVector, Vector3};
+use dense::{block, dense, dense_system, numeric_jacobian};
+use nalgebra::Vector3;
 use proptest::prelude::*;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+
+mod dense;
 
 /// A graph as a script builds it: the smoother, and the same factors in a plain list.
 struct Script {
@@ -19,7 +22,7 @@ fn diagonal_information(sigma_m: f64, sigma_rad: f64) -> Matrix3<f64> {
     Matrix3::from_diagonal(&Vector3::new(sigma_m, sigma_m, sigma_rad).map(|s| 1.0 / (s * s)))
 }
 
-/// Sum of three uniforms: near enough to a Gaussian of unit variance.
+/// Sum of four uniforms: near enough to a Gaussian of unit variance.
 fn noise(rng: &mut ChaCha8Rng) -> f64 {
     (0..4).map(|_| rng.random_range(-0.866..0.866)).sum()
 }
@@ -39,10 +42,11 @@ impl Script {
 
     /// A noisy measurement of a true relative pose, with a full information matrix.
     fn measured(&mut self, i: u32, j: u32, sigma_m: f64, sigma_rad: f64) -> Factor {
-        let e = Vector3::new(sigma_m, sigma_m, sigma_rad).map(|s| s * noise(&mut self.rng));
         let truth = self.truth[i as usize].between(&self.truth[j as usize]);
         let skew = Pose2::new(0.3, -0.2, 0.4).adjoint();
         let information = symmetrised(&sandwich(&skew, &diagonal_information(sigma_m, sigma_rad)));
+        let diagonal = Vector3::new(sigma_m, sigma_m, sigma_rad).map(|s| s * noise(&mut self.rng));
+        let e = skew.transpose().try_inverse().unwrap() * diagonal;
         Factor { i, j, i_from_j: truth.compose(&Pose2::exp(&e)), information }
     }
 
@@ -93,67 +97,6 @@ impl Script {
         }
         s
     }
-}
-
-fn error(f: &Factor, a: &Pose2, b: &Pose2) -> Vector3<f64> {
-    f.i_from_j.inverse().compose(&a.inverse().compose(b)).log()
-}
-
-/// Jacobian of `error` in the perturbation of one end, five-point stencil.
-fn numeric_jacobian(error_at: impl Fn(&Vector3<f64>) -> Vector3<f64>) -> Matrix3<f64> {
-    let h = 1e-3;
-    let column = |k: usize| {
-        let at = |s: f64| error_at(&(Vector3::ith(k, s * h)));
-        (at(-2.0) - at(2.0) + (at(1.0) - at(-1.0)) * 8.0) / (12.0 * h)
-    };
-    Matrix3::from_columns(&[column(0), column(1), column(2)])
-}
-
-/// Information matrix and half the negative gradient over all poses but the first.
-fn dense_system(poses: &[Pose2], factors: &[&Factor]) -> (DMatrix<f64>, DVector<f64>) {
-    let n = 3 * poses.len();
-    let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
-    for f in factors {
-        let (i, j) = (f.i as usize, f.j as usize);
-        let (a, b) = (poses[i], poses[j]);
-        let ji = numeric_jacobian(|d| error(f, &a.compose(&Pose2::exp(d)), &b));
-        let jj = numeric_jacobian(|d| error(f, &a, &b.compose(&Pose2::exp(d))));
-        for (p, jp) in [(i, ji), (j, jj)] {
-            let w = jp.transpose() * f.information;
-            let mut part = g.fixed_rows_mut::<3>(3 * p);
-            part -= w * error(f, &a, &b);
-            for (q, jq) in [(i, ji), (j, jj)] {
-                let mut block = h.fixed_view_mut::<3, 3>(3 * p, 3 * q);
-                block += w * jq;
-            }
-        }
-    }
-    (h.view((3, 3), (n - 3, n - 3)).into_owned(), g.rows(3, n - 3).into_owned())
-}
-
-/// Optimum and covariance (of all poses, the first one's zero) by dense Gauss–Newton.
-fn dense(script: &Script) -> (Vec<Pose2>, DMatrix<f64>) {
-    let factors = script.factors();
-    let mut poses = script.truth.clone();
-    for _ in 0..30 {
-        let (h, g) = dense_system(&poses, &factors);
-        let step = h.cholesky().unwrap().solve(&g);
-        for (k, pose) in poses[1..].iter_mut().enumerate() {
-            *pose = pose.compose(&Pose2::exp(&step.fixed_rows::<3>(3 * k).into_owned()));
-        }
-        if step.amax() < 1e-12 {
-            break;
-        }
-    }
-    let n = 3 * poses.len();
-    let mut covariance = DMatrix::zeros(n, n);
-    let inverse = dense_system(&poses, &factors).0.cholesky().unwrap().inverse();
-    covariance.view_mut((3, 3), (n - 3, n - 3)).copy_from(&inverse);
-    (poses, covariance)
-}
-
-fn block(m: &DMatrix<f64>, i: u32, j: u32) -> Matrix3<f64> {
-    m.fixed_view::<3, 3>(3 * i as usize, 3 * j as usize).into_owned()
 }
 
 fn near(a: &Matrix3<f64>, b: &Matrix3<f64>, scale: f64) -> bool {
@@ -338,19 +281,20 @@ fn a_factor_that_cannot_be_solved_is_mended_by_its_removal() {
 
 #[test]
 fn a_wild_start_descends_to_a_minimum() {
-    // Bent far out of shape, so that an undamped step overshoots.
-    for seed in 0..20 {
+    // Bent far out of shape, so that full steps overshoot.
+    for seed in 0..40 {
         let mut s = Script::new(seed);
         for _ in 0..40 {
             let turn = s.rng.random_range(-1.5..1.5);
-            s.extend(Pose2::new(1.0, 0.0, turn), 0.3, 0.3);
+            s.extend(Pose2::new(1.0, 0.0, turn), 0.3, 0.6);
         }
-        for k in 0..10 {
+        for k in 0..if seed < 20 { 1 } else { 10 } {
             s.close(3 * k, 40 - k, 0.01, 0.01);
         }
         s.smoother.update().unwrap();
-        let (_, g) = dense_system(s.smoother.poses(), &s.factors());
-        assert!(g.amax() < 0.3 && s.smoother.chi2() < 200.0, "seed {seed}: χ² {}", s.smoother.chi2());
+        let (h, g) = dense_system(s.smoother.poses(), &s.factors());
+        let decrement = g.dot(&h.cholesky().unwrap().solve(&g));
+        assert!(decrement < 1e-5, "seed {seed}: {decrement}");
     }
 }
 
