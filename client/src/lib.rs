@@ -2,4 +2,5 @@
 //!
 //! Client library of the toponym mapping server.
 
+pub mod log;
 pub mod sim;

@@ -25,7 +25,8 @@ pub use robot::{Drive, Motion, Wheels};
 pub use world::{Plan, Room, RoomKind, World};
 
 use geom::Point;
-use toponym_proto::{Clock, Header, Message, Odom, Pose, Say, Scan, Setup, Stamp};
+use toponym_proto::merge::{Sentences, order_stamp};
+use toponym_proto::{Clock, End, Header, Message, Odom, Pose, Say, Scan, Setup, Stamp};
 
 /// A scenario that can't be played.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -162,6 +163,7 @@ impl Scenario {
         scans.sort_by_key(|s| s.0);
         timed.sort_by(|a, b| a.0.total_cmp(&b.0));
         let mut messages: Vec<Message> = timed.into_iter().map(|(_, message)| message).collect();
+        messages.push(Message::End(End { header: self.header(drive.duration_s()) }));
         number(&mut messages);
         let messages = self.interleave(messages, &said);
         let truth = Truth { scans, names: self.names(&said), start: drive.at(0.0), path_m: drive.path_m() };
@@ -193,25 +195,24 @@ impl Scenario {
         })
     }
 
-    /// A sentence enters just before the first message of a later stamp.
     fn interleave(&self, stream: Vec<Message>, said: &[Sentence]) -> Vec<Message> {
         let mut messages = Vec::with_capacity(stream.len() + said.len());
-        let mut waiting = said.iter().enumerate().peekable();
+        let mut waiting = Sentences::default();
+        for (k, sentence) in said.iter().enumerate() {
+            waiting.push(self.say(k, sentence), Stamp::default());
+        }
         for message in stream {
-            while let Some((k, s)) =
-                waiting.next_if(|(_, s)| stamp(&message) > Some(Stamp::from_seconds(s.began_s)))
-            {
-                messages.push(self.say(k, s));
+            while let Some(say) = waiting.pop_before(order_stamp(&message)) {
+                messages.push(Message::Say(say));
             }
             messages.push(message);
         }
-        messages.extend(waiting.map(|(k, s)| self.say(k, s)));
         messages
     }
 
-    fn say(&self, k: usize, sentence: &Sentence) -> Message {
+    fn say(&self, k: usize, sentence: &Sentence) -> Say {
         let began = Stamp::from_seconds(sentence.began_s);
-        Message::Say(Say {
+        Say {
             id: ulid::Ulid::from_parts((began.ns / 1_000_000) as u64, k as u128).to_string(),
             robot: Some(self.robot.clone()),
             text: sentence.text.clone(),
@@ -221,7 +222,7 @@ impl Scenario {
             began: Some(began),
             ended: Some(Stamp::from_seconds(sentence.ended_s)),
             retracts: None,
-        })
+        }
     }
 
     /// The rooms that were spoken of.
@@ -265,21 +266,12 @@ fn centre(world: &World) -> Point {
     [sum[0] / n, sum[1] / n]
 }
 
-/// A robot's message has a header with its stamp; a sentence has none.
 fn header_mut(message: &mut Message) -> Option<&mut Header> {
     match message {
         Message::Setup(m) => Some(&mut m.header),
         Message::Odom(m) => Some(&mut m.header),
         Message::Scan(m) => Some(&mut m.header),
-        Message::Say(_) => None,
-    }
-}
-
-fn stamp(message: &Message) -> Option<Stamp> {
-    match message {
-        Message::Setup(m) => Some(m.header.stamp),
-        Message::Odom(m) => Some(m.header.stamp),
-        Message::Scan(m) => Some(m.header.stamp),
+        Message::End(m) => Some(&mut m.header),
         Message::Say(_) => None,
     }
 }
@@ -324,17 +316,17 @@ mod tests {
         let mut seq = 0;
         let mut newest = None;
         for (k, message) in recording.messages.iter().enumerate() {
-            if let Message::Say(say) = message {
-                assert!(newest <= say.began, "{say:?} comes too late");
-                let next = recording.messages[k + 1..].iter().find_map(stamp);
-                assert!(next.is_none_or(|n| Some(n) > say.began), "{say:?} comes too early");
-            } else {
-                let header = header_mut(&mut message.clone()).cloned().unwrap();
+            if let Some(header) = message.header() {
                 assert_eq!(header.seq, seq);
                 seq += 1;
-                newest = newest.max(stamp(message));
+                newest = newest.max(Some(header.stamp));
+            } else if let Message::Say(say) = message {
+                assert!(newest <= say.began, "{say:?} comes too late");
+                let next = recording.messages[k + 1..].iter().map(order_stamp).next();
+                assert!(next > say.began, "{say:?} comes too early");
             }
         }
+        assert!(matches!(recording.messages.last(), Some(Message::End(_))));
         assert!(recording.messages.iter().any(|m| matches!(m, Message::Say(_))));
     }
 

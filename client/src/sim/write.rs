@@ -47,7 +47,7 @@ pub fn carmen(recording: &Recording) -> String {
             Message::Scan(scan) if front.as_ref() == Some(&scan.laser) => {
                 flaser(&mut text, scan, &odom, offset_m);
             }
-            Message::Scan(_) | Message::Say(_) => {}
+            Message::Scan(_) | Message::Say(_) | Message::End(_) => {}
         }
     }
     text
