@@ -157,9 +157,10 @@ impl Keys {
     pub fn all_inputs(&self) -> String {
         self.robot("*", "in/**")
     }
-    /// Selects all questions.
-    pub fn all_asks(&self) -> String {
-        format!("{}/map/*/ask/*", self.prefix)
+
+    /// Selects everything that can be asked, and more.
+    pub fn everything(&self) -> String {
+        format!("{}/**", self.prefix)
     }
 
     /// What follows `toponym/v1/{site}/`, as chunks.

@@ -1,0 +1,163 @@
+//! The server's settings: every one with its default beside it; a TOML file may change them, and
+//! none need be given.
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use toponym_proto::keys::{DEFAULT_ENDPOINT, DEFAULT_SITE, check_id};
+use toponym_proto::{Invalid, Limits};
+
+/// Settings of `toponym-server serve`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct ServerConfig {
+    /// Site: second part of every key; several servers with different sites share one network.
+    pub site: String,
+    /// Zenoh endpoints to listen on. Beyond loopback everybody on the network can connect.
+    pub listen: Vec<String>,
+    /// Folder of the saved maps.
+    pub data: PathBuf,
+    /// How long a robot's stream waits for sentences that come over other connections.
+    pub hold_back_s: f64,
+    /// How long a missing message is waited for.
+    pub gap_wait_s: f64,
+    /// Over how many later messages a missing one is waited for.
+    pub gap_window: usize,
+    /// Messages that may wait in memory, per robot and on the way in.
+    pub queue_messages: usize,
+    /// Shortest time between two published graphs of a map.
+    pub graph_period_s: f64,
+    /// Robots that are kept account of.
+    pub robots_max: usize,
+    /// Maps that are kept.
+    pub maps_max: usize,
+    /// Limits of what is taken in.
+    pub limits: Limits,
+    /// The filter of new maps.
+    pub mapper: toponym_core::Config,
+}
+
+impl Default for ServerConfig {
+    fn default() -> Self {
+        Self {
+            site: DEFAULT_SITE.into(),
+            listen: vec![DEFAULT_ENDPOINT.into()],
+            data: "./toponym-data".into(),
+            hold_back_s: 0.5,
+            gap_wait_s: 3.0,
+            gap_window: 1024,
+            queue_messages: 20_000,
+            graph_period_s: 1.0,
+            robots_max: 64,
+            maps_max: 16,
+            limits: Limits::default(),
+            mapper: toponym_core::Config::default(),
+        }
+    }
+}
+
+/// A configuration can't be used.
+#[derive(Debug, thiserror::Error)]
+pub enum ConfigError {
+    /// The file can't be read.
+    #[error("{}: {source}", path.display())]
+    Read {
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It isn't TOML, or has a key that doesn't exist, or a value of the wrong type; the text
+    /// shows the line.
+    #[error("{}: {source}", path.display())]
+    Parse {
+        /// Which file.
+        path: PathBuf,
+        /// What and where.
+        source: Box<toml::de::Error>,
+    },
+    /// A value out of its range.
+    #[error("configuration: {0}")]
+    Invalid(#[from] Invalid),
+}
+
+impl ServerConfig {
+    /// Reads a TOML file and checks it.
+    pub fn read(path: &Path) -> Result<Self, ConfigError> {
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| ConfigError::Read { path: path.into(), source })?;
+        let config: Self = toml::from_str(&text)
+            .map_err(|source| ConfigError::Parse { path: path.into(), source: Box::new(source) })?;
+        config.check()?;
+        Ok(config)
+    }
+
+    /// Checks the values.
+    pub fn check(&self) -> Result<(), ConfigError> {
+        check_id("site", &self.site)?;
+        if self.listen.is_empty() {
+            return Err(Invalid::new("listen", "is empty: nobody could connect").into());
+        }
+        for (field, value, min) in [
+            ("hold_back_s", self.hold_back_s, 0.0),
+            ("gap_wait_s", self.gap_wait_s, 0.0),
+            ("graph_period_s", self.graph_period_s, 0.01),
+        ] {
+            if !(min..=60.0).contains(&value) {
+                return Err(Invalid::new(field, format!("is {value}, must be from {min} to 60")).into());
+            }
+        }
+        for (field, value) in [
+            ("gap_window", self.gap_window),
+            ("queue_messages", self.queue_messages),
+            ("robots_max", self.robots_max),
+            ("maps_max", self.maps_max),
+            ("mapper.particles", self.mapper.particles as usize),
+        ] {
+            if value == 0 {
+                return Err(Invalid::new(field, "is 0, must be at least 1").into());
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<ServerConfig, String> {
+        let config: ServerConfig = toml::from_str(text).map_err(|e| e.to_string())?;
+        config.check().map_err(|e| e.to_string())?;
+        Ok(config)
+    }
+
+    #[test]
+    fn an_empty_file_means_the_defaults() {
+        assert_eq!(read("").unwrap(), ServerConfig::default());
+    }
+
+    #[test]
+    fn settings_are_taken() {
+        let config = read("site = \"lab\"\n[mapper]\nparticles = 5\n[limits]\nbeams = 9\n").unwrap();
+        assert_eq!((config.site.as_str(), config.mapper.particles, config.limits.beams), ("lab", 5, 9));
+    }
+
+    #[test]
+    fn an_unknown_key_is_shown_with_its_line() {
+        let error = read("site = \"lab\"\nhold_back = 1\n").unwrap_err();
+        assert!(error.contains("line 2") && error.contains("hold_back"), "{error}");
+    }
+
+    #[test]
+    fn values_out_of_range_are_named() {
+        for (text, name) in [
+            ("site = \"A\"", "site"),
+            ("listen = []", "listen"),
+            ("hold_back_s = nan", "hold_back_s"),
+            ("gap_wait_s = -1.0", "gap_wait_s"),
+            ("queue_messages = 0", "queue_messages"),
+        ] {
+            assert!(read(text).unwrap_err().contains(name), "{text}");
+        }
+    }
+}

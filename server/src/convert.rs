@@ -1,0 +1,275 @@
+//! Between the wire and the core: validated messages to events, answers and effects to JSON types.
+//! Nothing is judged here: `toponym-proto` has refused what is wrong, the core decides what a
+//! range means.
+
+use nalgebra::Matrix3;
+use toponym_core::effects::{self, EdgeKind, TrackState};
+use toponym_core::event::{self, Event};
+use toponym_core::query::{self, GraphAnswer, WhereAnswer};
+use toponym_core::{Pose2, geometry};
+use toponym_proto::answer::{
+    ANSWER_VERSION, Candidate, Edge, FromRobot, Goal, GraphReply, GridReply, Grounded, Heard, HeardStatus,
+    LabelEntry, LabelsReply, MapIdentity, Particle, Place, PoseState, Reachable, Resolved, WhereReply,
+};
+use toponym_proto::{Message, Pose, Stamp};
+
+/// A message as the core takes it. A sentence without `began` counts as said at the clock's zero:
+/// the merge has filled it in before.
+pub fn event(message: Message) -> Event {
+    match message {
+        Message::Setup(m) => Event::Setup(event::Setup {
+            robot: m.header.robot,
+            lasers: m.lasers.into_iter().map(laser).collect(),
+        }),
+        Message::Odom(m) => Event::Odom(event::Odom {
+            robot: m.header.robot,
+            boot: m.header.boot,
+            stamp_ns: m.header.stamp.ns,
+            odom_from_body: pose_in(&m.odom_from_body),
+        }),
+        Message::Scan(m) => Event::Scan(event::Scan {
+            robot: m.header.robot,
+            laser: m.laser,
+            stamp_ns: m.header.stamp.ns,
+            angle_min_rad: m.angle_min_rad,
+            angle_increment_rad: m.angle_increment_rad,
+            time_increment_s: m.time_increment_s,
+            ranges_m: m.ranges_m,
+        }),
+        Message::Say(m) => {
+            let began = m.began.unwrap_or_default();
+            Event::Utterance(event::Utterance {
+                id: m.id,
+                text: m.text,
+                alternatives: m.alternatives.into_iter().map(|h| (h.text, h.p)).collect(),
+                speaker: m.speaker,
+                began_ns: began.ns,
+                ended_ns: m.ended.unwrap_or(began).ns,
+            })
+        }
+        Message::End(_) => Event::Flush,
+    }
+}
+
+fn laser(l: toponym_proto::Laser) -> event::Laser {
+    event::Laser {
+        id: l.id,
+        body_from_laser: Pose2::new(l.x_m, l.y_m, l.yaw_rad),
+        upside_down: l.upside_down,
+        range_min_m: l.range_min_m,
+        range_max_m: l.range_max_m,
+        ignored_rad: l.ignored_rad,
+    }
+}
+
+fn pose_in(p: &Pose) -> Pose2 {
+    Pose2::new(p.x_m, p.y_m, p.yaw_rad)
+}
+
+/// A pose as it goes out.
+pub fn pose(p: &Pose2) -> Pose {
+    Pose { x_m: p.x_m, y_m: p.y_m, yaw_rad: p.yaw_rad }
+}
+
+/// A covariance, row-major x y yaw.
+pub fn covariance(m: &Matrix3<f64>) -> [f64; 9] {
+    std::array::from_fn(|k| m[(k / 3, k % 3)])
+}
+
+/// How far a pose is to be believed.
+pub fn pose_state(state: TrackState) -> PoseState {
+    match state {
+        TrackState::Mapping => PoseState::Mapping,
+        TrackState::Localised => PoseState::Localised,
+        TrackState::Lost => PoseState::Lost,
+    }
+}
+
+/// Feedback on a sentence; `durable`: whether it is on disk.
+pub fn heard(h: effects::Heard, durable: bool) -> Heard {
+    Heard {
+        id: h.id,
+        status: match h.status {
+            effects::HeardStatus::Understood => HeardStatus::Understood,
+            effects::HeardStatus::NotUnderstood => HeardStatus::NotUnderstood,
+            effects::HeardStatus::Refused => HeardStatus::Refused,
+        },
+        durable,
+        parse: h.parse,
+        grounded: h.grounded.into_iter().map(|(place, p)| Grounded { place, p }).collect(),
+        words: h.words,
+        error: None,
+    }
+}
+
+/// Answer of `ask/where`; `robot` is the map's, from whose newest pose distances count.
+pub fn where_reply(answer: WhereAnswer, map: MapIdentity, stamp: Stamp, robot: &str) -> WhereReply {
+    let from = answer.robot;
+    WhereReply {
+        v: ANSWER_VERSION,
+        query: "where".into(),
+        name: answer.text,
+        resolved: Resolved { label: answer.label, via: answer.via },
+        map,
+        stamp,
+        p_none: answer.p_none,
+        candidates: answer.candidates.into_iter().map(|c| candidate(c, from.as_ref(), robot)).collect(),
+    }
+}
+
+fn candidate(c: query::Candidate, from: Option<&Pose2>, robot: &str) -> Candidate {
+    let Pose2 { x_m, y_m, yaw_rad } = c.pose;
+    Candidate {
+        region: c.place,
+        label: c.label,
+        probability: c.probability,
+        p_is: c.p_is,
+        x_m,
+        y_m,
+        yaw_rad,
+        cov: covariance(&c.covariance),
+        polygon_m: Vec::new(),
+        // A robot stood there; whether one can drive there from here nobody has looked yet.
+        goal: Some(Goal { x_m, y_m, yaw_rad, reachable: Reachable::Unknown }),
+        from_robot: from.map(|from| FromRobot {
+            robot: robot.into(),
+            distance_m: from.distance_m(&c.pose),
+            bearing_rad: geometry::wrap((y_m - from.y_m).atan2(x_m - from.x_m) - from.yaw_rad),
+        }),
+        because: c.because,
+    }
+}
+
+/// Answer of `ask/labels`.
+pub fn labels_reply(labels: Vec<query::LabelCount>, map: MapIdentity) -> LabelsReply {
+    let labels = labels
+        .into_iter()
+        .map(|l| LabelEntry { label: l.label, utterances: l.utterances, region: l.place })
+        .collect();
+    LabelsReply { v: ANSWER_VERSION, query: "labels".into(), map, labels }
+}
+
+/// Answer of `ask/graph`.
+pub fn graph_reply(graph: GraphAnswer, map: MapIdentity) -> GraphReply {
+    let places = graph.places.into_iter().map(|p| Place {
+        id: p.id,
+        stamp: Stamp { ns: p.stamp_ns },
+        x_m: p.pose.x_m,
+        y_m: p.pose.y_m,
+        yaw_rad: p.pose.yaw_rad,
+        labels: p.labels.into_iter().collect(),
+    });
+    let particles = graph.particles.into_iter().map(|p| Particle {
+        count: p.count,
+        weight: p.weight,
+        edges: p.edges.iter().map(edge).collect(),
+    });
+    GraphReply {
+        v: ANSWER_VERSION,
+        query: "graph".into(),
+        map,
+        places: places.collect(),
+        particles: particles.collect(),
+        effective_sample_size: graph.effective_sample_size,
+    }
+}
+
+fn edge(e: &query::EdgeView) -> Edge {
+    let kind = match e.kind {
+        EdgeKind::Distance => "distance",
+        EdgeKind::Semantic => "semantic",
+        EdgeKind::Relocalisation => "relocalisation",
+    };
+    Edge {
+        i: e.i,
+        j: e.j,
+        kind: kind.into(),
+        dx_m: e.i_from_j.x_m,
+        dy_m: e.i_from_j.y_m,
+        dyaw_rad: e.i_from_j.yaw_rad,
+    }
+}
+
+/// Answer of `ask/grid`.
+pub fn grid_reply(grid: query::Grid, map: MapIdentity) -> GridReply {
+    GridReply {
+        v: ANSWER_VERSION,
+        query: "grid".into(),
+        map,
+        resolution_m: grid.resolution_m,
+        width: grid.width,
+        height: grid.height,
+        map_from_grid: pose(&grid.map_from_grid),
+        cells: grid.cells,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::FRAC_PI_2;
+    use toponym_proto::{Header, Odom, Say, Scan};
+
+    #[test]
+    fn what_a_range_means_is_left_to_the_core() {
+        let ranges_m = vec![f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 1e9, -1.0];
+        let message = Message::Scan(Scan {
+            header: Header { robot: "r1".into(), stamp: Stamp { ns: 5 }, ..Default::default() },
+            laser: "front".into(),
+            angle_min_rad: -1.0,
+            angle_increment_rad: 0.5,
+            time_increment_s: 0.001,
+            ranges_m: ranges_m.clone(),
+        });
+        let Event::Scan(scan) = event(message) else { panic!("not a scan") };
+        assert_eq!(
+            scan.ranges_m.iter().map(|r| r.to_bits()).collect::<Vec<_>>(),
+            ranges_m.iter().map(|r| r.to_bits()).collect::<Vec<_>>()
+        );
+        assert_eq!((scan.stamp_ns, scan.time_increment_s), (5, 0.001));
+    }
+
+    #[test]
+    fn yaw_is_wrapped_and_the_boot_kept() {
+        let header = Header { robot: "r1".into(), boot: 7, ..Default::default() };
+        let odom_from_body = Pose { x_m: 1.0, y_m: 2.0, yaw_rad: 7.0 };
+        let Event::Odom(odom) = event(Message::Odom(Odom { header, odom_from_body })) else {
+            panic!("not odometry")
+        };
+        assert_eq!((odom.boot, odom.odom_from_body), (7, Pose2::new(1.0, 2.0, 7.0)));
+        assert!(odom.odom_from_body.yaw_rad < 1.0);
+    }
+
+    #[test]
+    fn a_sentence_that_never_ended_ended_when_it_began() {
+        let say =
+            Say { id: "1".into(), text: "gym".into(), began: Some(Stamp { ns: 9 }), ..Default::default() };
+        let Event::Utterance(u) = event(Message::Say(say)) else { panic!("no utterance") };
+        assert_eq!((u.began_ns, u.ended_ns), (9, 9));
+    }
+
+    #[test]
+    fn distance_and_bearing_count_from_the_robot() {
+        let candidate = query::Candidate {
+            place: 3,
+            label: "gym".into(),
+            probability: 1.0,
+            p_is: 1.0,
+            pose: Pose2::new(1.0, 5.0, 0.0),
+            covariance: Matrix3::from_fn(|i, j| (3 * i + j) as f64),
+            because: vec![],
+        };
+        let answer = WhereAnswer {
+            text: "gym".into(),
+            label: Some("gym".into()),
+            via: "exact".into(),
+            p_none: 0.0,
+            candidates: vec![candidate],
+            robot: Some(Pose2::new(1.0, 2.0, FRAC_PI_2)),
+        };
+        let reply = where_reply(answer, MapIdentity::default(), Stamp { ns: 1 }, "r07");
+        let from = reply.candidates[0].from_robot.as_ref().unwrap();
+        assert!((from.distance_m - 3.0).abs() < 1e-12 && from.bearing_rad.abs() < 1e-12);
+        assert!(reply.candidates[0].cov.iter().enumerate().all(|(k, c)| *c == k as f64));
+    }
+}

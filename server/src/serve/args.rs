@@ -1,0 +1,98 @@
+//! Command line of `serve`.
+
+use super::{ServeError, serve};
+use crate::config::ServerConfig;
+use clap::{Args, ValueEnum};
+use std::path::PathBuf;
+use tracing_subscriber::EnvFilter;
+
+/// Arguments of `serve`.
+#[derive(Args, Clone, Debug, Default)]
+pub struct ServeArgs {
+    /// Settings (TOML); without it the defaults hold
+    #[arg(long, value_name = "FILE")]
+    pub config: Option<PathBuf>,
+    /// Record what the map takes in, in its order; `map FILE` plays it back
+    #[arg(long, value_name = "FILE")]
+    pub record: Option<PathBuf>,
+    /// Check the settings and show them, but do not serve
+    #[arg(long)]
+    pub check_config: bool,
+    /// Listen here instead of where the settings say, e.g. tcp/0.0.0.0:7457
+    #[arg(long, value_name = "ENDPOINT")]
+    pub listen: Vec<String>,
+    /// Folder of the saved maps, instead of the settings'
+    #[arg(long, value_name = "FOLDER")]
+    pub data: Option<PathBuf>,
+}
+
+/// How logs are written to stderr.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub enum LogFormat {
+    /// Lines for people.
+    #[default]
+    Text,
+    /// One JSON object a line.
+    Json,
+}
+
+/// Logs to stderr from here on; `RUST_LOG` selects, by default what concerns an operator.
+pub fn init_logging(format: LogFormat) {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
+    let logs = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    // An error means that somebody logs already.
+    let _ = match format {
+        LogFormat::Text => logs.try_init(),
+        LogFormat::Json => logs.json().try_init(),
+    };
+}
+
+impl ServeArgs {
+    /// The settings: the file's, changed by the arguments.
+    pub fn settings(&self) -> Result<ServerConfig, ServeError> {
+        let mut config = match &self.config {
+            Some(path) => ServerConfig::read(path)?,
+            None => ServerConfig::default(),
+        };
+        if !self.listen.is_empty() {
+            config.listen.clone_from(&self.listen);
+        }
+        if let Some(data) = &self.data {
+            config.data.clone_from(data);
+        }
+        config.check()?;
+        Ok(config)
+    }
+}
+
+/// `serve` as a program: until SIGTERM or ctrl-c.
+pub async fn run(args: ServeArgs) -> anyhow::Result<()> {
+    let config = args.settings()?;
+    if args.check_config {
+        print!("{}", toml::to_string(&config)?);
+        return Ok(());
+    }
+    let shutdown = shutdown_signal()?;
+    Ok(serve(config, args.record, shutdown).await?)
+}
+
+/// Ready when the process is asked to end.
+#[cfg(unix)]
+fn shutdown_signal() -> std::io::Result<impl Future<Output = ()>> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let (mut term, mut int) = (signal(SignalKind::terminate())?, signal(SignalKind::interrupt())?);
+    Ok(async move {
+        tokio::select! {
+            _ = term.recv() => {}
+            _ = int.recv() => {}
+        }
+    })
+}
+
+/// Ready when the process is asked to end.
+#[cfg(not(unix))]
+fn shutdown_signal() -> std::io::Result<impl Future<Output = ()>> {
+    Ok(async {
+        let _ = tokio::signal::ctrl_c().await;
+    })
+}

@@ -1,0 +1,348 @@
+//! The intake: one thread that takes what the network delivers, decodes and validates it, and
+//! moves each robot's stream along. It alone owns the robots, so it needs no locks.
+
+use std::collections::BTreeMap;
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::time::{Duration, Instant};
+use toponym_proto::answer::{Ack, ErrorCode, Heard, HeardStatus, Problem, RobotState};
+use toponym_proto::keys::{ANY_ROBOT, Input, check_key};
+use toponym_proto::{Keys, Message, Refused, Say};
+use tracing::{error, warn};
+
+use super::board::{Board, lock};
+use super::maps::Maps;
+use super::outbox::Outbox;
+use super::robot::Robot;
+use crate::config::ServerConfig;
+
+/// How often streams are looked after when nothing arrives.
+const TICK: Duration = Duration::from_millis(10);
+/// Shortest time between two acks of a robot, and between two of its states.
+const REPORT_PERIOD: Duration = Duration::from_millis(50);
+/// Messages taken before the streams are moved on.
+const BATCH: usize = 256;
+/// How long a sentence waits for a robot that was never heard: its guide may be faster.
+const ROBOT_WAIT: Duration = Duration::from_secs(2);
+/// Sentences that wait so.
+const WAITING_MAX: usize = 64;
+
+/// What the network delivers.
+pub enum Arrival {
+    /// A payload on a key.
+    Payload {
+        /// The key.
+        key: String,
+        /// Zenoh's encoding.
+        encoding: String,
+        /// The bytes; shorter than the limit.
+        bytes: Vec<u8>,
+    },
+    /// A payload too long to be kept.
+    TooLarge {
+        /// The key.
+        key: String,
+        /// Its length.
+        bytes: usize,
+    },
+    /// The server stops: move on what there is, then end.
+    Stop,
+}
+
+/// The door: hands arrivals over without ever blocking.
+#[derive(Clone)]
+pub struct Door {
+    queue: SyncSender<Arrival>,
+    board: Arc<Board>,
+    payload_max_bytes: usize,
+}
+
+impl Door {
+    /// With the queue behind it.
+    pub fn new(board: Arc<Board>, config: &ServerConfig) -> (Self, Receiver<Arrival>) {
+        let (queue, arrivals) = sync_channel(config.queue_messages);
+        (Self { queue, board, payload_max_bytes: config.limits.payload_bytes }, arrivals)
+    }
+
+    /// For Zenoh's callbacks.
+    pub fn sample(&self, sample: &zenoh::sample::Sample) {
+        if sample.kind() != zenoh::sample::SampleKind::Put {
+            return;
+        }
+        let (key, bytes) = (sample.key_expr().to_string(), sample.payload().len());
+        let arrival = if bytes > self.payload_max_bytes {
+            Arrival::TooLarge { key, bytes }
+        } else {
+            let encoding = sample.encoding().to_string();
+            Arrival::Payload { key, encoding, bytes: sample.payload().to_bytes().into_owned() }
+        };
+        if let Err(TrySendError::Full(_)) = self.queue.try_send(arrival) {
+            let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
+            // The first, and then each doubling: a flood must not flood the log.
+            if overrun.is_power_of_two() {
+                error!(overrun, "DATA LOSS: messages arrive faster than they can be looked at");
+            }
+        }
+    }
+
+    /// Tells the intake to end.
+    pub fn close(&self) {
+        let _ = self.queue.send(Arrival::Stop);
+    }
+}
+
+/// A sentence whose robot was never heard.
+struct WaitingSay {
+    arrived: Duration,
+    robot: String,
+    say: Say,
+}
+
+/// What was last published about a robot.
+#[derive(Default)]
+struct Reported {
+    at: Duration,
+    ack: Option<Ack>,
+    state: Option<RobotState>,
+}
+
+/// The intake's state.
+pub struct Intake {
+    config: ServerConfig,
+    keys: Keys,
+    board: Arc<Board>,
+    outbox: Outbox,
+    maps: Maps,
+    robots: BTreeMap<String, Robot>,
+    reported: BTreeMap<String, Reported>,
+    waiting: Vec<WaitingSay>,
+    started: Instant,
+}
+
+impl Intake {
+    /// With no robots yet.
+    pub fn new(config: ServerConfig, board: Arc<Board>, outbox: Outbox, maps: Maps) -> Self {
+        Self {
+            keys: board.keys.clone(),
+            config,
+            board,
+            outbox,
+            maps,
+            robots: BTreeMap::new(),
+            reported: BTreeMap::new(),
+            waiting: Vec::new(),
+            started: Instant::now(),
+        }
+    }
+
+    /// Works until it is told to stop; then hands over all there is and stops the maps.
+    pub fn run(mut self, arrivals: &Receiver<Arrival>) {
+        let mut open = true;
+        while open {
+            let mut next = arrivals.recv_timeout(TICK);
+            for _ in 0..BATCH {
+                match next {
+                    Ok(Arrival::Stop) | Err(RecvTimeoutError::Disconnected) => open = false,
+                    Ok(arrival) => self.take(arrival),
+                    Err(RecvTimeoutError::Timeout) => break,
+                }
+                if !open {
+                    break;
+                }
+                next = arrivals.try_recv().map_err(|_| RecvTimeoutError::Timeout);
+            }
+            self.advance(false);
+        }
+        // The maps' queues are bounded: each round hands over what has room.
+        while self.robots.values().any(|robot| !robot.is_idle() && robot.map().is_some()) {
+            self.advance(true);
+            std::thread::sleep(TICK);
+        }
+        self.advance(true);
+        self.maps.stop();
+        self.report(true);
+    }
+
+    fn now(&self) -> Duration {
+        self.started.elapsed()
+    }
+
+    fn take(&mut self, arrival: Arrival) {
+        let (key, result) = match arrival {
+            Arrival::Payload { key, encoding, bytes } => {
+                let message = self.read(&key, &encoding, &bytes);
+                (key, message)
+            }
+            Arrival::TooLarge { key, bytes } => {
+                let max = self.config.limits.payload_bytes;
+                (key, Err(Refused::TooLarge { bytes, max }))
+            }
+            Arrival::Stop => return,
+        };
+        let robot = match self.keys.input(&key) {
+            Ok((robot, _)) => robot,
+            Err(invalid) => {
+                warn!(key, "refused: {invalid}");
+                return;
+            }
+        };
+        match result {
+            Ok(Message::Say(say)) => self.take_say(self.now(), robot, say),
+            Ok(message) => self.take_message(&robot, &key, message),
+            Err(refused) => self.refuse(&robot, &key, &refused),
+        }
+    }
+
+    fn read(&self, key: &str, encoding: &str, bytes: &[u8]) -> Result<Message, Refused> {
+        let (robot, input) = self.keys.input(key)?;
+        let message = Message::decode(&input, encoding, bytes, &self.config.limits)?;
+        check_key(&robot, &input, &message)?;
+        Ok(message)
+    }
+
+    /// The robot's state, made at need; none if there are too many robots already.
+    fn robot(&mut self, id: &str) -> Option<&mut Robot> {
+        if !self.robots.contains_key(id) {
+            if self.robots.len() >= self.config.robots_max {
+                error!(robot = id, robots_max = self.config.robots_max, "refused: too many robots");
+                return None;
+            }
+            let watermark = self.maps.watermark(id);
+            self.robots.insert(id.into(), Robot::new(id, &self.config, watermark));
+        }
+        self.robots.get_mut(id)
+    }
+
+    fn take_message(&mut self, id: &str, key: &str, message: Message) {
+        let now = self.now();
+        let Some(robot) = self.robot(id) else {
+            return;
+        };
+        if robot.is_full() {
+            let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
+            if overrun.is_power_of_two() {
+                error!(key, overrun, "DATA LOSS: the map can't keep up, messages are dropped");
+            }
+            return;
+        }
+        robot.push(now, message);
+    }
+
+    fn refuse(&mut self, robot: &str, key: &str, refused: &Refused) {
+        warn!(key, "refused: {refused}");
+        let problem = match refused {
+            Refused::TooLarge { .. } => Problem::new(ErrorCode::TooLarge, refused.to_string()),
+            Refused::Malformed(_) => Problem::new(ErrorCode::BadArgument, refused.to_string()),
+            Refused::Invalid(invalid) => Problem::from(invalid.clone()),
+        };
+        let problem = Problem { message: format!("{key}: {}", problem.message), ..problem };
+        // A sentence's sender listens for what became of it; without an id there is no better way.
+        if key.ends_with("/say") && matches!(self.keys.input(key), Ok((_, Input::Say))) {
+            self.answer_say(robot, "", problem.clone());
+        }
+        if robot != ANY_ROBOT
+            && let Some(robot) = self.robot(robot)
+        {
+            robot.refuse(problem);
+        }
+    }
+
+    fn take_say(&mut self, arrived: Duration, robot: String, mut say: Say) {
+        let id = say.robot.clone().unwrap_or_else(|| robot.clone());
+        if say.retracts.is_some() {
+            let problem = Problem::new(ErrorCode::Unsupported, "this server can't take sentences back yet");
+            self.answer_say(&robot, &say.id, problem.field("retracts"));
+            return;
+        }
+        let mapping: Vec<&String> =
+            self.robots.iter().filter(|(_, r)| r.map().is_some()).map(|(id, _)| id).collect();
+        let target = match mapping.as_slice() {
+            [only] if id == ANY_ROBOT => (*only).clone(),
+            several if several.contains(&&id) => id,
+            [_, _, ..] if id == ANY_ROBOT => {
+                let names: Vec<&str> = mapping.iter().map(|id| id.as_str()).collect();
+                let problem = Problem::new(ErrorCode::RobotAmbiguous, "there are several robots")
+                    .field("robot")
+                    .hint(format!("say which: {}", names.join(", ")));
+                return self.answer_say(&robot, &say.id, problem);
+            }
+            _ => {
+                if self.now().saturating_sub(arrived) < ROBOT_WAIT && self.waiting.len() < WAITING_MAX {
+                    self.waiting.push(WaitingSay { arrived, robot, say });
+                    return;
+                }
+                let problem = match self.robots.get(&id).and_then(|r| r.state().error) {
+                    Some(problem) => problem,
+                    None => Problem::new(ErrorCode::NoSuchRobot, format!("no robot {id:?} is mapping"))
+                        .field("robot")
+                        .hint("its setup has not been accepted; see robot/{robot}/out/state and info"),
+                };
+                return self.answer_say(&robot, &say.id, problem);
+            }
+        };
+        say.robot = Some(target.clone());
+        if let Some(robot) = self.robots.get_mut(&target) {
+            robot.push_say(arrived, say);
+        }
+    }
+
+    /// Tells a guide that a sentence can't be used.
+    fn answer_say(&self, robot: &str, id: &str, problem: Problem) {
+        warn!(robot, id, "sentence refused: {problem}");
+        let heard = Heard {
+            id: id.into(),
+            status: HeardStatus::Refused,
+            durable: false,
+            parse: String::new(),
+            grounded: Vec::new(),
+            words: format!("I can't use that: {}.", problem.message),
+            error: Some(problem),
+        };
+        self.outbox.send(self.keys.heard(robot), &heard);
+    }
+
+    fn advance(&mut self, finish: bool) {
+        for waiting in std::mem::take(&mut self.waiting) {
+            self.take_say(waiting.arrived, waiting.robot, waiting.say);
+        }
+        let now = self.now();
+        let maps = &mut self.maps;
+        for robot in self.robots.values_mut() {
+            robot.advance(now, finish, &mut |setup| maps.find(setup));
+        }
+        self.report(finish);
+    }
+
+    /// Publishes acks and states that changed, at most one each per period and robot.
+    fn report(&mut self, at_once: bool) {
+        let now = self.now();
+        for (id, robot) in &self.robots {
+            let reported = self.reported.entry(id.clone()).or_default();
+            if !at_once && now.saturating_sub(reported.at) < REPORT_PERIOD {
+                continue;
+            }
+            reported.at = now;
+            let ack = robot.ack();
+            if ack != reported.ack {
+                if let Some(ack) = &ack {
+                    self.outbox.send(self.keys.ack(id), ack);
+                }
+                reported.ack = ack;
+            }
+            let state = robot.state();
+            let known = reported.state.as_ref();
+            // What is merely taken is told by the ack.
+            let news = known.is_none_or(|known| {
+                let counts = toponym_proto::answer::Counts { taken: known.counts.taken, ..state.counts };
+                (&known.map, known.boot, &known.error) != (&state.map, state.boot, &state.error)
+                    || known.counts != counts
+            });
+            if news {
+                self.outbox.send(self.keys.state(id), &state);
+                reported.state = Some(state.clone());
+            }
+            lock(&self.board.robots).insert(id.clone(), state);
+        }
+    }
+}

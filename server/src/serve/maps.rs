@@ -1,0 +1,168 @@
+//! The maps there are: loads them at the start, makes new ones for robots, starts and stops their
+//! threads.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicI64;
+use std::sync::mpsc::sync_channel;
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+use std::time::Duration;
+use toponym_core::Mapper;
+use toponym_proto::Setup;
+use toponym_proto::answer::{ErrorCode, Problem};
+use toponym_proto::record::{RecordError, RecordWriter};
+use tracing::{error, info, warn};
+
+use super::board::{Board, MapView};
+use super::mapping::{Due, Mapping, Work};
+use super::outbox::Outbox;
+use crate::config::ServerConfig;
+use crate::store::{Card, Store};
+
+/// Messages that wait in front of the filter; those before them wait with their robot.
+const QUEUE: usize = 256;
+
+/// The maps and their threads.
+pub struct Maps {
+    config: ServerConfig,
+    board: Arc<Board>,
+    outbox: Outbox,
+    store: Arc<Store>,
+    record: Option<PathBuf>,
+    threads: Vec<JoinHandle<()>>,
+    /// (boot, seq) that the saved maps have of each robot.
+    watermarks: BTreeMap<String, (u64, u64)>,
+}
+
+impl Maps {
+    /// None yet. `record`: where to record the first map; others get their id added to the name.
+    pub fn new(
+        config: ServerConfig,
+        board: Arc<Board>,
+        outbox: Outbox,
+        store: Arc<Store>,
+        record: Option<PathBuf>,
+    ) -> Self {
+        Self { config, board, outbox, store, record, threads: Vec::new(), watermarks: BTreeMap::new() }
+    }
+
+    /// Starts a thread for each saved map.
+    pub fn start_saved(&mut self, saved: BTreeMap<String, (Mapper, Card)>) -> io::Result<()> {
+        for (id, (mapper, card)) in saved {
+            info!(map = id, robot = card.robot, "loaded");
+            if self.record.is_some() {
+                warn!(map = id, "the record begins in the middle of this map: replay it with --start-map");
+            }
+            if let Some(watermark) = card.watermark {
+                let known = self.watermarks.entry(card.robot.clone()).or_insert(watermark);
+                *known = watermark.max(*known);
+            }
+            self.start(&id, mapper, card)?;
+        }
+        Ok(())
+    }
+
+    /// What the saved maps have of a robot's stream.
+    pub fn watermark(&self, robot: &str) -> Option<(u64, u64)> {
+        self.watermarks.get(robot).copied()
+    }
+
+    /// The map that a robot's setup names, new if there is none. A map has one robot.
+    pub fn find(&mut self, setup: &Setup) -> Result<Arc<MapView>, Problem> {
+        let (id, robot) = (&setup.map, &setup.header.robot);
+        let maps = self.board.maps.load();
+        if let Some(view) = maps.get(id) {
+            if view.robot == *robot {
+                return Ok(view.clone());
+            }
+            let message = format!("map {id:?} is mapped by robot {:?}", view.robot);
+            return Err(Problem::new(ErrorCode::MapTaken, message)
+                .field("map")
+                .hint("one robot maps a map: give this one another map in its setup"));
+        }
+        if maps.len() >= self.config.maps_max {
+            let message = format!("there are {} maps already", maps.len());
+            return Err(Problem::new(ErrorCode::TooLarge, message)
+                .field("map")
+                .hint("raise maps_max in the server's configuration"));
+        }
+        let card = Card { uuid: new_uuid(), robot: robot.clone(), watermark: None };
+        self.start(id, Mapper::new(self.config.mapper.clone()), card)
+            .map_err(|e| Problem::new(ErrorCode::Internal, format!("map {id:?} could not be started: {e}")))
+    }
+
+    fn start(&mut self, id: &str, mapper: Mapper, card: Card) -> io::Result<Arc<MapView>> {
+        let record = match self.record_path(id) {
+            Some(path) => Some(open_record(&path).map_err(io::Error::other)?),
+            None => None,
+        };
+        let (work, queue) = sync_channel(QUEUE);
+        let view = Arc::new(MapView {
+            id: id.into(),
+            uuid: card.uuid.clone(),
+            robot: card.robot.clone(),
+            snapshot: arc_swap::ArcSwap::new(mapper.snapshot()),
+            stamp_ns: AtomicI64::new(0),
+            recorded: Mutex::default(),
+            work,
+        });
+        let mapping = Mapping {
+            view: view.clone(),
+            mapper,
+            card,
+            board: self.board.clone(),
+            outbox: self.outbox.clone(),
+            store: self.store.clone(),
+            record,
+            graph_period: Duration::from_secs_f64(self.config.graph_period_s),
+            record_due: Due::default(),
+            snapshot_due: Due::default(),
+            graph_due: Due::default(),
+        };
+        let thread = std::thread::Builder::new().name(format!("map {id}"));
+        self.threads.push(thread.spawn(move || mapping.run(&queue))?);
+        self.board.add_map(view.clone());
+        Ok(view)
+    }
+
+    /// Where a map is recorded: the first under the name given, others with their id added.
+    fn record_path(&self, id: &str) -> Option<PathBuf> {
+        let path = self.record.as_ref()?;
+        if self.threads.is_empty() {
+            return Some(path.clone());
+        }
+        let mut name = path.as_os_str().to_owned();
+        name.push(format!(".{id}"));
+        warn!(map = id, path = %Path::new(&name).display(), "a further map is recorded in a file of its own");
+        Some(name.into())
+    }
+
+    /// Lets every map work off its queue and save itself; returns when all have.
+    pub fn stop(&mut self) {
+        for view in self.board.maps.load().values() {
+            let _ = view.work.send(Work::Stop);
+        }
+        for thread in self.threads.drain(..) {
+            let name = thread.thread().name().unwrap_or_default().to_string();
+            if thread.join().is_err() {
+                error!("DATA LOSS: the thread of {name} failed; its map is as last saved");
+            }
+        }
+    }
+}
+
+fn open_record(path: &Path) -> Result<RecordWriter<File>, RecordError> {
+    RecordWriter::new(
+        File::create(path).map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display())))?,
+    )
+}
+
+/// 128 random bits in the usual notation.
+fn new_uuid() -> String {
+    let hex = format!("{:032x}", u128::from(ulid::Ulid::generate()));
+    let part = |range: std::ops::Range<usize>| hex.get(range).unwrap_or_default();
+    [part(0..8), part(8..12), part(12..16), part(16..20), part(20..32)].join("-")
+}

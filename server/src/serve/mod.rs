@@ -1,0 +1,221 @@
+//! `serve`: robots and guides in, maps and answers out, over Zenoh.
+//!
+//! ```text
+//! zenoh callbacks ─ Door (bounded, never blocks) ─► Intake thread: decode, order, hold back
+//!                                                      │ bounded queue per map
+//!                                                      ▼
+//!                          Mapping thread per map: record, Mapper::step ─► Outbox thread ─► zenoh
+//!                                                      │ ArcSwap<Snapshot>
+//!                                                      ▼
+//! zenoh queries ─► blocking tasks: answers from the Board, never from the filter
+//! ```
+
+mod args;
+pub mod board;
+mod intake;
+mod mapping;
+mod maps;
+mod network;
+mod outbox;
+pub mod queries;
+mod robot;
+
+pub use args::{LogFormat, ServeArgs, init_logging, run};
+pub use network::NetworkError;
+
+use crate::config::{ConfigError, ServerConfig};
+use crate::store::{Store, StoreError};
+use board::Board;
+use intake::{Door, Intake};
+use maps::Maps;
+use outbox::Outbox;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::thread::JoinHandle;
+use std::time::Duration;
+use tokio::sync::Semaphore;
+use toponym_proto::Keys;
+use toponym_proto::answer::{ErrorCode, ErrorReply, Problem};
+use toponym_proto::codec::ENCODING_JSON;
+use tracing::{info, warn};
+use zenoh::query::Query;
+use zenoh::{Session, Wait};
+use zenoh_ext::{AdvancedSubscriberBuilderExt, HistoryConfig, RecoveryConfig};
+
+/// Queries answered at the same time; more get `busy`.
+const QUERIES_MAX: usize = 64;
+/// Grids and commands at the same time.
+const HEAVY_MAX: usize = 2;
+/// How long a robot's cache may take to answer.
+const HISTORY_WAIT: Duration = Duration::from_secs(2);
+
+/// The server can't start or stop.
+#[derive(Debug, thiserror::Error)]
+pub enum ServeError {
+    /// Settings.
+    #[error(transparent)]
+    Config(#[from] ConfigError),
+    /// Data folder.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// Zenoh.
+    #[error(transparent)]
+    Network(#[from] NetworkError),
+    /// Threads, files.
+    #[error(transparent)]
+    Io(#[from] std::io::Error),
+}
+
+impl From<zenoh::Error> for ServeError {
+    fn from(e: zenoh::Error) -> Self {
+        Self::Network(NetworkError::Zenoh(e))
+    }
+}
+
+/// A running server.
+pub struct Server {
+    session: Session,
+    board: Arc<Board>,
+    door: Door,
+    intake: JoinHandle<()>,
+    outbox: Outbox,
+    publisher: JoinHandle<()>,
+    _token: zenoh::liveliness::LivelinessToken,
+    endpoints: Vec<String>,
+}
+
+/// Serves until `shutdown` is ready; then takes in what has arrived, saves all maps and returns.
+/// `record`: file for the merged stream of messages.
+pub async fn serve(
+    config: ServerConfig,
+    record: Option<PathBuf>,
+    shutdown: impl Future<Output = ()>,
+) -> Result<(), ServeError> {
+    let server = Server::start(config, record).await?;
+    shutdown.await;
+    info!("stopping");
+    server.stop().await
+}
+
+impl Server {
+    /// Loads the saved maps and opens the network; when this returns, clients can connect.
+    pub async fn start(config: ServerConfig, record: Option<PathBuf>) -> Result<Self, ServeError> {
+        config.check()?;
+        let keys = Keys::new(&config.site).map_err(ConfigError::Invalid)?;
+        let store = Arc::new(Store::open(&config.data)?);
+        let saved = store.load()?;
+        let session = network::open(&config).await?;
+        let endpoints = session.info().locators().await.iter().map(ToString::to_string).collect();
+        let board = Arc::new(Board::new(keys.clone(), &config.site));
+        let (outbox, publisher) = Outbox::start(board.clone(), session.clone())?;
+        let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, record);
+        maps.start_saved(saved)?;
+        let (door, arrivals) = Door::new(board.clone(), &config);
+        let intake = Intake::new(config, board.clone(), outbox.clone(), maps);
+        let intake =
+            std::thread::Builder::new().name("intake".into()).spawn(move || intake.run(&arrivals))?;
+        subscribe(&session, &keys, &door).await?;
+        answer_queries(&session, &board).await?;
+        let token = session.liveliness().declare_token(keys.alive(&session.zid().to_string())).await?;
+        let server = Self { session, board, door, intake, outbox, publisher, _token: token, endpoints };
+        info!(site = server.board.site, endpoints = server.endpoints.join(" "), "listening");
+        Ok(server)
+    }
+
+    /// Where clients can connect.
+    pub fn endpoints(&self) -> &[String] {
+        &self.endpoints
+    }
+
+    /// Takes in what has arrived, saves all maps, closes the network.
+    pub async fn stop(self) -> Result<(), ServeError> {
+        let Self { session, door, intake, outbox, publisher, .. } = self;
+        let done = tokio::task::spawn_blocking(move || {
+            door.close();
+            let intake = intake.join();
+            outbox.stop();
+            intake.and(publisher.join())
+        });
+        let joined = done.await.map_err(std::io::Error::other)?;
+        session.close().await?;
+        joined.map_err(|_| std::io::Error::other("a thread of the server failed: see the log").into())
+    }
+}
+
+async fn subscribe(session: &Session, keys: &Keys, door: &Door) -> Result<(), zenoh::Error> {
+    let streams = door.clone();
+    session
+        .declare_subscriber(keys.all_inputs())
+        .callback(move |sample| streams.sample(&sample))
+        .history(HistoryConfig::default().detect_late_publishers())
+        .recovery(RecoveryConfig::default().heartbeat())
+        .query_timeout(HISTORY_WAIT)
+        .background()
+        .await?;
+    let sentences = door.clone();
+    session
+        .declare_subscriber(keys.say(Some("*")))
+        .callback(move |sample| sentences.sample(&sample))
+        .background()
+        .await
+}
+
+async fn answer_queries(session: &Session, board: &Arc<Board>) -> Result<(), zenoh::Error> {
+    let board = board.clone();
+    let (light, heavy) = (Arc::new(Semaphore::new(QUERIES_MAX)), Arc::new(Semaphore::new(HEAVY_MAX)));
+    let runtime = tokio::runtime::Handle::current();
+    session
+        .declare_queryable(board.keys.everything())
+        .callback(move |query| {
+            let key = query.key_expr().as_str();
+            let permits = if queries::is_heavy(key) { &heavy } else { &light };
+            match permits.clone().try_acquire_owned() {
+                Ok(permit) => {
+                    let board = board.clone();
+                    runtime.spawn_blocking(move || {
+                        reply_to(&board, &query);
+                        drop(permit);
+                    });
+                }
+                Err(_) => reply_problem(&query, Problem::new(ErrorCode::Busy, "too many queries: try again")),
+            }
+        })
+        .background()
+        .await
+}
+
+/// Replies to a query on each key it selects.
+fn reply_to(board: &Board, query: &Query) {
+    let selected = query.key_expr();
+    let payload = query.payload().map(|p| p.to_bytes()).unwrap_or_default();
+    let parameters = query.parameters().as_str();
+    let keys = if selected.is_wild() {
+        let matching = |key: &String| {
+            zenoh::key_expr::KeyExpr::try_from(key.as_str()).is_ok_and(|key| selected.intersects(&key))
+        };
+        queries::askable(board).into_iter().filter(matching).collect()
+    } else {
+        vec![selected.to_string()]
+    };
+    if keys.is_empty() {
+        let problem = Problem::new(ErrorCode::NoSuchQuery, format!("nothing to ask matches {selected}"));
+        return reply_problem(query, problem.field("key"));
+    }
+    for key in keys {
+        match queries::answer(board, &key, parameters, &payload) {
+            Ok(json) => {
+                if let Err(e) = query.reply(&key, json).encoding(ENCODING_JSON).wait() {
+                    warn!(key, "could not reply: {e}");
+                }
+            }
+            Err(problem) => reply_problem(query, problem),
+        }
+    }
+}
+
+fn reply_problem(query: &Query, problem: Problem) {
+    let json = serde_json::to_vec(&ErrorReply { error: problem }).unwrap_or_default();
+    if let Err(e) = query.reply_err(json).encoding(ENCODING_JSON).wait() {
+        warn!(key = query.key_expr().as_str(), "could not reply: {e}");
+    }
+}

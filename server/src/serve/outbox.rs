@@ -1,0 +1,104 @@
+//! Everything published goes through one bounded queue and one thread, so that a client that does
+//! not read can't hold up a map.
+
+use serde::Serialize;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::thread::JoinHandle;
+use toponym_proto::codec::ENCODING_JSON;
+use tracing::{debug, error, warn};
+use zenoh::qos::CongestionControl;
+use zenoh::{Session, Wait};
+
+use super::board::{Board, MapView, lock};
+use super::queries;
+
+/// Queue length: seconds of poses of a few robots.
+const QUEUE: usize = 1024;
+
+enum Parcel {
+    Payload { key: String, json: Vec<u8>, must_arrive: bool },
+    Graph(Arc<MapView>),
+    Stop,
+}
+
+/// Publishes from any thread.
+#[derive(Clone)]
+pub struct Outbox {
+    board: Arc<Board>,
+    queue: SyncSender<Parcel>,
+}
+
+impl Outbox {
+    /// Starts the thread that publishes.
+    pub fn start(board: Arc<Board>, session: Session) -> std::io::Result<(Self, JoinHandle<()>)> {
+        let (queue, parcels) = sync_channel(QUEUE);
+        let outbox = Self { board: board.clone(), queue };
+        let thread = std::thread::Builder::new()
+            .name("publish".into())
+            .spawn(move || publish_all(&board, &session, &parcels))?;
+        Ok((outbox, thread))
+    }
+
+    /// What the next supersedes (poses): dropped where the network can't follow.
+    pub fn stream<T: Serialize>(&self, key: String, value: &T) {
+        if let Some(json) = self.keep(&key, value)
+            && let Err(TrySendError::Full(_)) =
+                self.queue.try_send(Parcel::Payload { key, json, must_arrive: false })
+        {
+            debug!("publishing falls behind: a pose is left out");
+        }
+    }
+
+    /// What must arrive (feedback, states): waits for room.
+    pub fn send<T: Serialize>(&self, key: String, value: &T) {
+        if let Some(json) = self.keep(&key, value) {
+            // An error means that the server stops.
+            let _ = self.queue.send(Parcel::Payload { key, json, must_arrive: true });
+        }
+    }
+
+    /// The graph of a map as it is when its turn comes; false if there is no room now.
+    pub fn graph(&self, map: &Arc<MapView>) -> bool {
+        self.queue.try_send(Parcel::Graph(map.clone())).is_ok()
+    }
+
+    /// Ends the thread once all before is published.
+    pub fn stop(&self) {
+        let _ = self.queue.send(Parcel::Stop);
+    }
+
+    fn keep<T: Serialize>(&self, key: &str, value: &T) -> Option<Vec<u8>> {
+        match serde_json::to_vec(value) {
+            Ok(json) => {
+                lock(&self.board.latest).insert(key.into(), json.clone());
+                Some(json)
+            }
+            Err(e) => {
+                error!(key, "can't be written as JSON: {e}");
+                None
+            }
+        }
+    }
+}
+
+fn publish_all(board: &Board, session: &Session, parcels: &Receiver<Parcel>) {
+    while let Ok(parcel) = parcels.recv() {
+        let (key, json, must_arrive) = match parcel {
+            Parcel::Payload { key, json, must_arrive } => (key, json, must_arrive),
+            Parcel::Graph(map) => match queries::graph(&map) {
+                Ok(json) => (board.keys.graph(&map.id), json, false),
+                Err(problem) => {
+                    error!(map = map.id, "graph: {problem}");
+                    continue;
+                }
+            },
+            Parcel::Stop => return,
+        };
+        let congestion = if must_arrive { CongestionControl::Block } else { CongestionControl::Drop };
+        let put = session.put(&key, json).encoding(ENCODING_JSON).congestion_control(congestion);
+        if let Err(e) = put.express(must_arrive).wait() {
+            warn!(key, "could not be published: {e}");
+        }
+    }
+}

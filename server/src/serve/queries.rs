@@ -1,0 +1,200 @@
+//! Questions: every query gets a reply, an error if need be. Answers come from the snapshot that a
+//! map shows, whatever its filter is doing.
+
+use serde::Serialize;
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
+use toponym_core::{Answer, Query};
+use toponym_proto::answer::{ANSWER_VERSION, Done, ErrorCode, Info, Problem};
+use toponym_proto::keys::Ask;
+use toponym_proto::selector::{self, Arguments};
+
+use super::board::{Board, MapView, lock};
+use super::mapping::Work;
+use crate::convert;
+
+/// How long a command waits for a map that is busy.
+const COMMAND_WAIT: Duration = Duration::from_secs(60);
+/// Cells of a grid, metres.
+const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.01..=1.0;
+const RESOLUTION_DEFAULT_M: f64 = 0.05;
+
+/// All keys there are something to ask on, for queries with wildcards.
+pub fn askable(board: &Board) -> Vec<String> {
+    let mut keys = vec![board.keys.info()];
+    for map in board.maps.load().keys() {
+        keys.extend(Ask::ALL.map(|ask| board.keys.ask(map, ask)));
+        keys.push(board.keys.graph(map));
+    }
+    keys.extend(lock(&board.latest).keys().cloned());
+    keys
+}
+
+/// Whether answering takes long enough to be kept apart from the rest.
+pub fn is_heavy(key: &str) -> bool {
+    key.ends_with("/ask/grid") || key.contains("/do/")
+}
+
+/// Answers one query on a key without wildcards, as JSON.
+pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Result<Vec<u8>, Problem> {
+    let arguments = selector::decode(parameters, payload)?;
+    match board.keys.chunks(key).unwrap_or_default().as_slice() {
+        ["info"] => info(board, &arguments),
+        ["do", "save"] => save(board, &arguments),
+        ["do", command] => {
+            Err(Problem::new(ErrorCode::Unsupported, format!("there is no command {command:?}"))
+                .field("key")
+                .hint("this server knows do/save"))
+        }
+        ["map", id, "ask", what] => {
+            let map = map(board, id)?;
+            match Ask::ALL.into_iter().find(|ask| ask.as_str() == *what) {
+                Some(ask) => answer_about(&map, ask, arguments),
+                None => Err(no_such_query(key).hint("ask one of where, labels, graph, grid")),
+            }
+        }
+        ["map", id, "out", "graph"] => {
+            let map = map(board, id)?;
+            graph(&map)
+        }
+        ["robot" | "map", _, "out", _] => lock(&board.latest).get(key).cloned().ok_or_else(|| {
+            Problem::new(ErrorCode::NoSuchQuery, format!("nothing was published on {key} yet"))
+        }),
+        _ => Err(no_such_query(key).hint("keys are listed in proto/PROTOCOL.md")),
+    }
+}
+
+fn no_such_query(key: &str) -> Problem {
+    Problem::new(ErrorCode::NoSuchQuery, format!("{key} can't be asked")).field("key")
+}
+
+fn map(board: &Board, id: &str) -> Result<std::sync::Arc<MapView>, Problem> {
+    let maps = board.maps.load();
+    maps.get(id).cloned().ok_or_else(|| {
+        let known: Vec<&str> = maps.keys().map(String::as_str).collect();
+        let hint = if known.is_empty() {
+            "there is no map yet: a robot's setup brings one into being".to_string()
+        } else {
+            format!("there are: {}", known.join(", "))
+        };
+        Problem::new(ErrorCode::NoSuchMap, format!("there is no map {id:?}")).field("map").hint(hint)
+    })
+}
+
+/// Takes the arguments that a query knows; any other is an error, for it would be ignored.
+fn take<const N: usize>(mut arguments: Arguments, known: [&str; N]) -> Result<[Option<String>; N], Problem> {
+    let taken = known.map(|name| arguments.remove(name));
+    match arguments.into_keys().next() {
+        None => Ok(taken),
+        Some(name) => Err(Problem::new(ErrorCode::BadArgument, format!("{name}: no such argument"))
+            .field(name)
+            .hint(if known.is_empty() {
+                "it takes none".into()
+            } else {
+                format!("it takes: {}", known.join(", "))
+            })),
+    }
+}
+
+fn json<T: Serialize>(value: &T) -> Result<Vec<u8>, Problem> {
+    serde_json::to_vec(value).map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))
+}
+
+fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+    let snapshot = map.snapshot.load_full();
+    let query = match ask {
+        Ask::Where => {
+            let [name, text, robot] = take(arguments, ["name", "text", "robot"])?;
+            check_robot(map, robot.as_deref())?;
+            where_query(name, text)?
+        }
+        Ask::Labels | Ask::Graph => {
+            let [] = take(arguments, [])?;
+            if ask == Ask::Labels { Query::Labels } else { Query::Graph }
+        }
+        Ask::Grid => {
+            let [resolution] = take(arguments, ["resolution_m"])?;
+            Query::Grid { resolution_m: resolution.map_or(Ok(RESOLUTION_DEFAULT_M), |r| resolution_m(&r))? }
+        }
+    };
+    let identity = map.identity(&snapshot);
+    match (ask, snapshot.answer(&query)) {
+        (Ask::Where, Answer::Where(a)) => json(&convert::where_reply(a, identity, map.stamp(), &map.robot)),
+        (Ask::Labels, Answer::Labels(a)) => json(&convert::labels_reply(a, identity)),
+        (Ask::Graph, Answer::Graph(a)) => json(&convert::graph_reply(a, identity)),
+        (Ask::Grid, Answer::Grid(a)) => json(&convert::grid_reply(a, identity)),
+        _ => Err(Problem::new(ErrorCode::Internal, "the map answered another question")),
+    }
+}
+
+/// The graph of a map, as asked and as published.
+pub fn graph(map: &MapView) -> Result<Vec<u8>, Problem> {
+    answer_about(map, Ask::Graph, Arguments::new())
+}
+
+fn where_query(name: Option<String>, text: Option<String>) -> Result<Query, Problem> {
+    let ((Some(text), None) | (None, Some(text))) = (name, text) else {
+        return Err(Problem::new(ErrorCode::BadArgument, "give either name or text")
+            .field("name")
+            .hint("?name=lecture%20hall or ?text=where%20is%20the%20lecture%20hall"));
+    };
+    if text.trim().is_empty() {
+        return Err(Problem::new(ErrorCode::BadArgument, "name is empty").field("name"));
+    }
+    Ok(Query::Where { text })
+}
+
+fn check_robot(map: &MapView, robot: Option<&str>) -> Result<(), Problem> {
+    match robot {
+        Some(robot) if robot != map.robot => {
+            let message = format!("robot {robot:?} is not on map {:?}", map.id);
+            let hint = format!("its robot is {}", map.robot);
+            Err(Problem::new(ErrorCode::NoSuchRobot, message).field("robot").hint(hint))
+        }
+        _ => Ok(()),
+    }
+}
+
+fn resolution_m(text: &str) -> Result<f64, Problem> {
+    match text.parse() {
+        Ok(value) if RESOLUTION_M.contains(&value) => Ok(value),
+        _ => {
+            let range = format!("{} to {}", RESOLUTION_M.start(), RESOLUTION_M.end());
+            let message = format!("resolution_m is {text}, must be a number from {range}");
+            Err(Problem::new(ErrorCode::BadArgument, message).field("resolution_m"))
+        }
+    }
+}
+
+fn info(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
+    let [] = take(arguments.clone(), [])?;
+    json(&Info {
+        v: ANSWER_VERSION,
+        server: concat!("toponym-server ", env!("CARGO_PKG_VERSION")).into(),
+        site: board.site.clone(),
+        maps: board.maps.load().values().map(|map| map.identity(&map.snapshot.load())).collect(),
+        robots: lock(&board.robots).values().cloned().collect(),
+        overrun: board.overrun.load(std::sync::atomic::Ordering::Relaxed),
+    })
+}
+
+/// `do/save?map=…`, or all maps.
+fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
+    let [id] = take(arguments.clone(), ["map"])?;
+    let maps: Vec<_> = match id {
+        Some(id) => vec![map(board, &id)?],
+        None => board.maps.load().values().cloned().collect(),
+    };
+    let mut saved = Vec::new();
+    for map in maps {
+        let (reply, done) = sync_channel(1);
+        let stopped = || Problem::new(ErrorCode::Internal, format!("map {:?} has stopped", map.id));
+        map.work.send(Work::Save(reply)).map_err(|_| stopped())?;
+        match done.recv_timeout(COMMAND_WAIT) {
+            Ok(Ok(())) => saved.push(map.id.clone()),
+            Ok(Err(e)) => return Err(Problem::new(ErrorCode::Internal, e)),
+            Err(_) => return Err(Problem::new(ErrorCode::Busy, format!("map {:?} is busy", map.id))),
+        }
+    }
+    json(&Done { v: ANSWER_VERSION, query: "save".into(), maps: saved })
+}

@@ -1,0 +1,210 @@
+//! One robot's way into its map: decode → order by (boot, seq) → hold back for sentences → hand to
+//! the map's queue, and keep account of all of it.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::mpsc::TrySendError;
+use std::time::Duration;
+use toponym_proto::answer::{ANSWER_VERSION, Ack, Counts, ErrorCode, Problem, RobotState};
+use toponym_proto::merge::HoldBack;
+use toponym_proto::sequence::{Sequencer, Step};
+use toponym_proto::{Message, Say, Setup};
+use tracing::{error, info};
+
+use super::board::{MapView, lock};
+use super::mapping::Work;
+use crate::config::ServerConfig;
+
+/// Finds the map that a setup names, or says why the robot can't have it.
+pub type FindMap<'a> = dyn FnMut(&Setup) -> Result<Arc<MapView>, Problem> + 'a;
+
+/// State of one robot's streams.
+pub struct Robot {
+    id: String,
+    sequencer: Sequencer,
+    hold: HoldBack,
+    /// A step that waits until all before it is handed over: a setup that changes maps.
+    parked: Option<Step>,
+    /// Handed over next, once the map's queue has room.
+    outgoing: VecDeque<Message>,
+    /// The map its streams go to.
+    map: Option<Arc<MapView>>,
+    /// Newest boot.
+    boot: Option<u64>,
+    /// (boot, seq) of the last message handed to the map, or given up.
+    watermark: Option<(u64, u64)>,
+    counts: Counts,
+    error: Option<Problem>,
+    queue_messages: usize,
+}
+
+impl Robot {
+    /// `watermark`: what a saved map has of this robot already.
+    pub fn new(id: &str, config: &ServerConfig, watermark: Option<(u64, u64)>) -> Self {
+        let gap_wait = Duration::from_secs_f64(config.gap_wait_s);
+        Self {
+            id: id.into(),
+            sequencer: Sequencer::new(gap_wait, config.gap_window, watermark),
+            hold: HoldBack::new(Duration::from_secs_f64(config.hold_back_s)),
+            parked: None,
+            outgoing: VecDeque::new(),
+            map: None,
+            boot: watermark.map(|w| w.0),
+            watermark,
+            counts: Counts::default(),
+            error: None,
+            queue_messages: config.queue_messages,
+        }
+    }
+
+    /// Whether no more fits in: the map can't keep up.
+    pub fn is_full(&self) -> bool {
+        self.sequencer.len() + self.hold.len() + self.outgoing.len() >= self.queue_messages
+    }
+
+    /// Whether its streams go to a map.
+    pub fn map(&self) -> Option<&Arc<MapView>> {
+        self.map.as_ref()
+    }
+
+    /// Takes in a message of the robot's streams.
+    pub fn push(&mut self, now: Duration, message: Message) {
+        self.boot = self.boot.max(message.header().map(|h| h.boot));
+        self.sequencer.push(now, message);
+    }
+
+    /// Takes in a sentence said to the robot.
+    pub fn push_say(&mut self, now: Duration, say: Say) {
+        self.hold.push_say(now, say);
+    }
+
+    /// Counts a refusal; the newest is told in the robot's state.
+    pub fn refuse(&mut self, problem: Problem) {
+        self.counts.refused += 1;
+        self.error = Some(problem);
+    }
+
+    /// Moves on what is due at `now`, or everything if the stream is to `finish`.
+    pub fn advance(&mut self, now: Duration, finish: bool, find_map: &mut FindMap<'_>) {
+        let due = if finish { Duration::MAX } else { now };
+        while let Some(step) = self.parked.take().or_else(|| self.sequencer.pop(due)) {
+            if !self.take_step(now, step, find_map) {
+                break;
+            }
+        }
+        self.hand_over(due);
+    }
+
+    /// One step of the ordered stream; false if it has to wait.
+    fn take_step(&mut self, now: Duration, step: Step, find_map: &mut FindMap<'_>) -> bool {
+        let message = match step {
+            Step::Message(message) => message,
+            Step::Lost { boot, from, to } => {
+                self.counts.lost += to - from;
+                error!(robot = self.id, boot, from, to, "DATA LOSS: messages from..to never came");
+                return true;
+            }
+        };
+        if let Message::Setup(setup) = &message
+            && self.map.as_ref().is_none_or(|map| map.id != setup.map)
+        {
+            if !self.is_drained() {
+                // What came before belongs to the map before.
+                self.parked = Some(Step::Message(message));
+                return false;
+            }
+            match find_map(setup) {
+                Ok(map) => {
+                    info!(robot = self.id, map = map.id, "maps");
+                    (self.map, self.error) = (Some(map), None);
+                }
+                Err(problem) => {
+                    error!(robot = self.id, map = setup.map, "refused: {problem}");
+                    (self.map, self.error) = (None, Some(problem));
+                }
+            }
+        }
+        if self.map.is_some() {
+            self.hold.push(now, message);
+            return true;
+        }
+        self.counts.refused += 1;
+        self.error.get_or_insert_with(|| {
+            Problem::new(ErrorCode::BadArgument, "a message came before the robot's setup")
+                .field("setup")
+                .hint("publish in/setup first, with seq 0, and keep it in the publisher's cache")
+        });
+        true
+    }
+
+    /// Whether nothing is on the way to the map.
+    fn is_drained(&self) -> bool {
+        self.hold.is_empty() && self.outgoing.is_empty()
+    }
+
+    /// Whether nothing waits at all.
+    pub fn is_idle(&self) -> bool {
+        self.is_drained() && self.sequencer.is_empty() && self.parked.is_none()
+    }
+
+    /// Hands what is due to the map's queue, as far as there is room.
+    fn hand_over(&mut self, due: Duration) {
+        let Some(map) = &self.map else {
+            return;
+        };
+        while let Some(message) = self.outgoing.pop_front().or_else(|| self.hold.pop(due)) {
+            let stamp = message.header().map(|h| (h.boot, h.seq));
+            match map.work.try_send(Work::Take(message)) {
+                Ok(()) => {
+                    self.counts.taken += 1;
+                    self.watermark = stamp.or(self.watermark);
+                }
+                Err(TrySendError::Full(Work::Take(message))) => {
+                    self.outgoing.push_front(message);
+                    return;
+                }
+                Err(_) => {
+                    self.fail();
+                    return;
+                }
+            }
+        }
+    }
+
+    fn fail(&mut self) {
+        let Some(map) = self.map.take() else {
+            return;
+        };
+        let message = format!("map {:?} has stopped: see the server's log", map.id);
+        error!(robot = self.id, "DATA LOSS: {message}");
+        self.counts.refused += 1;
+        self.error = Some(Problem::new(ErrorCode::Internal, message));
+    }
+
+    /// What is told on `out/ack`; nothing before the first message.
+    pub fn ack(&self) -> Option<Ack> {
+        let (boot, seq) = self.watermark?;
+        let recorded = self.map.as_ref().and_then(|map| *lock(&map.recorded));
+        Some(Ack {
+            v: ANSWER_VERSION,
+            robot: self.id.clone(),
+            boot,
+            seq,
+            durable: recorded >= Some((boot, seq)),
+            lost: self.counts.lost,
+        })
+    }
+
+    /// What is told on `out/state`.
+    pub fn state(&self) -> RobotState {
+        let dropped = self.sequencer.dropped();
+        RobotState {
+            v: ANSWER_VERSION,
+            robot: self.id.clone(),
+            map: self.map.as_ref().map(|map| map.id.clone()),
+            boot: self.boot,
+            counts: Counts { repeated: dropped.repeated, stale: dropped.stale, ..self.counts },
+            error: self.error.clone(),
+        }
+    }
+}
