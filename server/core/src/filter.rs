@@ -35,7 +35,13 @@ impl Filter {
     /// N equal particles with nothing in them.
     pub fn new(config: Config) -> Self {
         let particles = vec![Particle::empty(config.particles.max(1))];
-        Self { config, graph: Graph::default(), ledger: Ledger::default(), particles, loops: Loops::default() }
+        Self {
+            config,
+            graph: Graph::default(),
+            ledger: Ledger::default(),
+            particles,
+            loops: Loops::default(),
+        }
     }
 
     /// Algorithm 1 for a place just left.
@@ -87,7 +93,7 @@ impl Filter {
                 let unlabelled = crate::labels::Labels::default();
                 let labels = if semantic { &p.labels } else { &unlabelled };
                 let (seed, gamma) = (self.config.seed, self.config.gamma_per_m2);
-                propose(seed, gamma, &self.graph, &p.smoother, labels, t, followed)
+                propose(seed, gamma, &self.graph, &p.smoother, labels, p.count, t, followed)
             })
             .collect();
         let mut union: BTreeMap<Vertex, Proposal> = BTreeMap::new();
@@ -104,8 +110,7 @@ impl Filter {
     fn take_or_refuse(&mut self, t: Vertex, fit: &Fit) -> Effect {
         let gamma = self.config.gamma_per_m2;
         let before = std::mem::take(&mut self.particles);
-        let judged: Vec<Option<Judgement>> =
-            before.par_iter().map(|p| judge(p, fit, t, gamma)).collect();
+        let judged: Vec<Option<Judgement>> = before.par_iter().map(|p| judge(p, fit, t, gamma)).collect();
         let relief = judged.iter().flatten().map(|j| j.log_evidence).fold(f64::NEG_INFINITY, f64::max);
         let (seed, places) = (self.config.seed, self.graph.place(fit.i).id);
         let outcomes: Vec<(Option<Particle>, Option<Particle>)> = before
@@ -157,11 +162,6 @@ fn refusals(t: Vertex, measured: &Measured) -> Effects {
     measured
         .refused
         .iter()
-        .map(|r| Effect::EdgeRefused {
-            i: r.i.into(),
-            j: t.into(),
-            kind: r.kind,
-            reason: r.reason.clone(),
-        })
+        .map(|r| Effect::EdgeRefused { i: r.i.into(), j: t.into(), kind: r.kind, reason: r.reason.clone() })
         .collect()
 }

@@ -40,7 +40,8 @@ pub fn grid(places: &[(Pose2, Arc<Place>)], resolution_m: f64) -> Grid {
     }
     let (width, height) =
         (((x1 - x0) / resolution_m).ceil() as usize, ((y1 - y0) / resolution_m).ceil() as usize);
-    let mut board = Board { odds: vec![0; width * height], known: vec![false; width * height], width, height };
+    let mut board =
+        Board { odds: vec![0; width * height], known: vec![false; width * height], width, height };
     let to_cell =
         |x: f64, y: f64| (((x - x0) / resolution_m).floor() as i64, ((y - y0) / resolution_m).floor() as i64);
     for (pose, place) in places {
@@ -60,13 +61,7 @@ pub fn grid(places: &[(Pose2, Arc<Place>)], resolution_m: f64) -> Grid {
             board.add(cx, cy, HIT);
         }
     }
-    Grid {
-        resolution_m,
-        width,
-        height,
-        map_from_grid: Pose2::new(x0, y0, 0.0),
-        cells: board.percentages(),
-    }
+    Grid { resolution_m, width, height, map_from_grid: Pose2::new(x0, y0, 0.0), cells: board.percentages() }
 }
 
 fn empty(resolution_m: f64) -> Grid {

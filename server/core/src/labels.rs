@@ -126,10 +126,14 @@ impl Labels {
             .flat_map(|(from, to)| {
                 self.evidence
                     .iter()
-                    .filter(move |e| e.place == from && matches!(e.source, Source::Direct | Source::DirectOther))
+                    .filter(move |e| {
+                        e.place == from && matches!(e.source, Source::Direct | Source::DirectOther)
+                    })
                     .map(move |e| Evidence { place: to, weight: CARRIED, source: Source::Carried, ..*e })
             })
-            .filter(|e| !self.evidence.iter().any(|o| o.utterance == e.utterance && o.source == Source::Carried))
+            .filter(|e| {
+                !self.evidence.iter().any(|o| o.utterance == e.utterance && o.source == Source::Carried)
+            })
             .collect();
         if !carried.is_empty() {
             Arc::make_mut(&mut self.evidence).extend(carried);

@@ -44,8 +44,10 @@ pub struct Fit {
     pub i: Vertex,
     /// The measurement.
     pub mode: Mode,
-    /// How the revisit was first proposed.
+    /// How this edge was proposed.
     pub kind: EdgeKind,
+    /// How the revisit was first proposed.
+    origin: EdgeKind,
     /// Places that agree with it, itself included.
     pub support: u32,
     /// Path over which they agree, metres.
@@ -117,6 +119,7 @@ impl Loops {
                 i: p.i,
                 mode: *m,
                 kind: p.kind,
+                origin: p.kind,
                 support: 1,
                 support_path_m: 0.0,
                 age: 0,
@@ -202,7 +205,8 @@ fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
     Some(Fit {
         i: lead.i,
         mode,
-        kind: lead.from.kind,
+        kind: lead.from.origin,
+        origin: lead.from.origin,
         support: lead.from.support + 1,
         support_path_m: lead.from.support_path_m + step_m,
         age: lead.from.age + 1,
@@ -242,11 +246,11 @@ fn look_back(graph: &Graph, t: Vertex, fit: &mut Fit) {
     fit.support_path_m = fit.support_path_m.max(support_path_m);
 }
 
-/// One fit per revisit: of those that say the same, semantic ones first (they tie what people
-/// named), else the best; supported ones before others.
+/// One fit per revisit: of those that say the same the best supported, then the best. Where words
+/// tie a pair of the revisit, that pair becomes the edge.
 fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
     fits.sort_by(|a, b| {
-        let rank = |f: &Fit| (f.supported(), f.support, f.kind == EdgeKind::Semantic);
+        let rank = |f: &Fit| (f.supported(), f.support);
         rank(b).cmp(&rank(a)).then(b.quality().total_cmp(&a.quality())).then(a.i.cmp(&b.i))
     });
     let mut kept: BTreeMap<usize, Fit> = BTreeMap::new();
@@ -259,8 +263,9 @@ fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
             }
         };
         match kept.values_mut().find(same) {
-            // The words found it too.
-            Some(k) if f.kind == EdgeKind::Semantic && k.kind != EdgeKind::Semantic => k.kind = f.kind,
+            Some(k) if f.kind == EdgeKind::Semantic && k.kind != EdgeKind::Semantic => {
+                (k.i, k.mode, k.kind) = (f.i, f.mode, f.kind);
+            }
             Some(_) => {}
             None => {
                 kept.insert(kept.len(), f);

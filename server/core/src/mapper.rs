@@ -187,7 +187,9 @@ impl Mapper {
         let Some(laser) = self.track.lasers.get(&scan.laser) else { return };
         let odometry = &self.track.odometry;
         let motion = |dt_s: f64| {
-            odometry.at(stamp_ns + (dt_s * 1e9) as i64).map_or(Pose2::default(), |p| odom_from_body.between(&p))
+            odometry
+                .at(stamp_ns + (dt_s * 1e9) as i64)
+                .map_or(Pose2::default(), |p| odom_from_body.between(&p))
         };
         let sweep = sweep(scan, laser, motion);
         let placed = self.track.front.scan(stamp_ns, odom_from_body, sweep);
@@ -218,10 +220,7 @@ impl Mapper {
                 && let (Some(old), Some(new)) = (before, self.map_from_body())
             {
                 self.epoch += 1;
-                effects.push(Effect::Jumped {
-                    epoch: self.epoch,
-                    new_from_old: new.compose(&old.inverse()),
-                });
+                effects.push(Effect::Jumped { epoch: self.epoch, new_from_old: new.compose(&old.inverse()) });
             }
         }
     }
@@ -229,8 +228,7 @@ impl Mapper {
     fn hear(&mut self, u: &Utterance, effects: &mut Effects) {
         let open: Vec<OpenPlace> = self.track.front.open_places().cloned().collect();
         let places = self.filter.graph.places().to_vec();
-        let path_m: Vec<f64> =
-            places.iter().map(|p| p.path_m).chain(open.iter().map(|p| p.path_m)).collect();
+        let path_m: Vec<f64> = places.iter().map(|p| p.path_m).chain(open.iter().map(|p| p.path_m)).collect();
         let stamps = places.iter().map(|p| p.stamp_ns).chain(open.iter().map(|p| p.stamp_ns));
         let stamps: Vec<StampNs> = stamps.collect();
         // The place held when the sentence began; one from before the map is said of its first.

@@ -64,7 +64,7 @@ pub fn distance(relative: &Relative) -> (f64, f64) {
     (mean_m, along.max(0.0).sqrt())
 }
 
-/// What one particle would look at from place `t`: distance edges, semantic edges, and any place
+/// What `count` equal particles would look at from place `t`: distance edges, semantic edges, and any place
 /// when it is lost. `followed` says which older places are already being followed.
 pub fn propose(
     seed: u64,
@@ -72,11 +72,13 @@ pub fn propose(
     graph: &Graph,
     smoother: &Smoother,
     labels: &Labels,
+    count: u32,
     t: Vertex,
     followed: impl Fn(Vertex) -> bool,
 ) -> Vec<Proposal> {
     let marginal = smoother.marginal(t);
     let sigma_m = marginal[(0, 0)].max(marginal[(1, 1)]).sqrt();
+    // What is being followed needs no second look; words do get one, wherever they point.
     let older = (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M) && !followed(i));
     let lost = sigma_m > LOST_SIGMA_M;
     let here = smoother.pose(t);
@@ -87,7 +89,11 @@ pub fn propose(
         .relative(t, &near)
         .unwrap_or_default()
         .iter()
-        .map(|r| Proposal { i: r.i, kind: EdgeKind::Distance, probability: distance_probability(r, gamma_per_m2) })
+        .map(|r| Proposal {
+            i: r.i,
+            kind: EdgeKind::Distance,
+            probability: distance_probability(r, gamma_per_m2),
+        })
         .collect();
     if lost {
         proposals.extend(older.map(|i| Proposal {
@@ -97,11 +103,10 @@ pub fn propose(
         }));
     }
     merge_semantic(&mut proposals, labels.similar(t), |i| graph.apart(i, t, LOCAL_PATH_M));
-    draw(seed, graph, t, proposals)
+    draw(seed, graph, t, count, proposals)
 }
 
-/// Eqs. (8–9): where two places are called alike with a greater probability than they are near,
-/// the edge is a semantic one.
+/// Eqs. (8–9): an edge that the words propose too is a semantic one, of either's probability.
 fn merge_semantic(
     proposals: &mut Vec<Proposal>,
     similar: BTreeMap<Vertex, f64>,
@@ -111,20 +116,29 @@ fn merge_semantic(
         if probability < SIMILARITY_MIN || !apart(i) {
             continue;
         }
-        let semantic = Proposal { i, kind: EdgeKind::Semantic, probability };
+        let kind = EdgeKind::Semantic;
         match proposals.iter_mut().find(|p| p.i == i) {
-            Some(p) if p.probability >= probability => {}
-            Some(p) => *p = semantic,
-            None => proposals.push(semantic),
+            Some(p) => {
+                let either = 1.0 - (1.0 - p.probability) * (1.0 - probability);
+                *p = Proposal { i, kind, probability: either };
+            }
+            None => proposals.push(Proposal { i, kind, probability }),
         }
     }
 }
 
 /// An independent draw per older place; of those drawn the likeliest, spread along the path.
-fn draw(seed: u64, graph: &Graph, t: Vertex, proposals: Vec<Proposal>) -> Vec<Proposal> {
+///
+/// A near place that is not drawn now is drawn from the next place, a metre on. A name is said
+/// once: there each of the equal particles draws for itself.
+fn draw(seed: u64, graph: &Graph, t: Vertex, count: u32, proposals: Vec<Proposal>) -> Vec<Proposal> {
+    let any_of = |p: &Proposal| match p.kind {
+        EdgeKind::Semantic => 1.0 - (1.0 - p.probability).powi(count as i32),
+        EdgeKind::Distance | EdgeKind::Relocalisation => p.probability,
+    };
     let mut drawn: Vec<(f64, Proposal)> = proposals
         .into_iter()
-        .map(|p| (p.probability / uniform(seed, t.into(), p.i.into(), Purpose::Propose).max(1e-9), p))
+        .map(|p| (any_of(&p) / uniform(seed, t.into(), p.i.into(), Purpose::Propose).max(1e-9), p))
         .filter(|(ratio, _)| *ratio > 1.0)
         .collect();
     drawn.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.i.cmp(&b.1.i)));

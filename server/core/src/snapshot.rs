@@ -92,7 +92,11 @@ impl Snapshot {
 
     /// All graphs; places as in the best.
     pub fn graph(&self) -> GraphAnswer {
-        let ids = self.places.iter().map(|p| (p.id, p.stamp_ns)).chain(self.open.iter().map(|o| (o.id, o.stamp_ns)));
+        let ids = self
+            .places
+            .iter()
+            .map(|p| (p.id, p.stamp_ns))
+            .chain(self.open.iter().map(|o| (o.id, o.stamp_ns)));
         let places = ids
             .zip(&self.poses)
             .enumerate()
@@ -112,7 +116,12 @@ impl Snapshot {
                 edges: p
                     .edges
                     .iter()
-                    .map(|e| EdgeView { i: self.id(e.i), j: self.id(e.j), kind: e.kind, i_from_j: e.i_from_j })
+                    .map(|e| EdgeView {
+                        i: self.id(e.i),
+                        j: self.id(e.j),
+                        kind: e.kind,
+                        i_from_j: e.i_from_j,
+                    })
                     .collect(),
             })
             .collect();
@@ -130,7 +139,8 @@ impl Snapshot {
         let mut out = Vec::new();
         for (k, label) in self.ledger.names().iter().enumerate() {
             let applies = self.applies(k as LabelId);
-            let Some((&place, _)) = applies.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0))) else {
+            let Some((&place, _)) = applies.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))
+            else {
                 continue;
             };
             let mut utterances: Vec<u32> = self.particles[0]
@@ -243,11 +253,17 @@ impl Snapshot {
     fn covariance(&self, v: Vertex) -> Matrix3<f64> {
         let own = |p: &Particle| {
             let v = v.min((p.smoother.len() as Vertex).saturating_sub(1));
-            if p.smoother.is_empty() { Matrix3::zeros() } else { in_map_axes(&p.smoother.pose(v), &p.smoother.marginal(v)) }
+            if p.smoother.is_empty() {
+                Matrix3::zeros()
+            } else {
+                in_map_axes(&p.smoother.pose(v), &p.smoother.marginal(v))
+            }
         };
         let best = &self.particles[0];
         let mut sum = own(best);
-        let Some(last) = (best.smoother.len() as Vertex).checked_sub(1).filter(|&last| v <= last) else { return sum };
+        let Some(last) = (best.smoother.len() as Vertex).checked_sub(1).filter(|&last| v <= last) else {
+            return sum;
+        };
         let here = best.smoother.pose(last);
         for p in self.particles.iter().skip(1) {
             let there = here.compose(&p.smoother.pose(last).between(&p.smoother.pose(v)));

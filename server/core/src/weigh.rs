@@ -119,7 +119,8 @@ pub fn choose(
         (f64::from(particle.count) * p + u).floor().min(f64::from(particle.count)) as u32
     };
     // A fresh semantic edge is the boldest guess: its refusal stays for a while.
-    let sibling = fit.kind == EdgeKind::Semantic && taking == particle.count && taking > 1 && p < 1.0 - CERTAIN;
+    let sibling =
+        fit.kind == EdgeKind::Semantic && taking == particle.count && taking > 1 && p < 1.0 - CERTAIN;
     if sibling {
         taking -= 1;
     }
@@ -173,4 +174,3 @@ fn add_edge(particle: &mut Particle, fit: &Fit, t: Vertex) -> bool {
     });
     true
 }
-

@@ -117,7 +117,13 @@ pub fn search(target: &Pyramid, source: &[Point], score_min: f64, modes_max: usi
     for heading in 0..HEADINGS {
         for y in (-half..half).step_by(block as usize) {
             for x in (-half..half).step_by(block as usize) {
-                push(&mut heap, target, &rotated[heading], Node { bound: 0, fineness: 0, heading: heading as u16, x, y }, floor);
+                push(
+                    &mut heap,
+                    target,
+                    &rotated[heading],
+                    Node { bound: 0, fineness: 0, heading: heading as u16, x, y },
+                    floor,
+                );
             }
         }
     }
@@ -145,7 +151,13 @@ pub fn search(target: &Pyramid, source: &[Point], score_min: f64, modes_max: usi
         }
         let step = 1i16 << (level - 1);
         for (dx, dy) in [(0, 0), (step, 0), (0, step), (step, step)] {
-            let child = Node { bound: 0, fineness: node.fineness + 1, heading: node.heading, x: node.x + dx, y: node.y + dy };
+            let child = Node {
+                bound: 0,
+                fineness: node.fineness + 1,
+                heading: node.heading,
+                x: node.x + dx,
+                y: node.y + dy,
+            };
             push(&mut heap, target, &rotated[usize::from(node.heading)], child, floor);
         }
     }

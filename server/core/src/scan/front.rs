@@ -181,7 +181,9 @@ impl FrontEnd {
     pub fn freeze(&mut self, path_m: f64) -> Vec<FrozenPlace> {
         let mut frozen = Vec::new();
         // The place held must stay, to hold the next scans.
-        while self.open.front().is_some_and(|p| p.path_m <= path_m) && (self.open.len() > 1 || path_m == f64::INFINITY) {
+        while self.open.front().is_some_and(|p| p.path_m <= path_m)
+            && (self.open.len() > 1 || path_m == f64::INFINITY)
+        {
             let Some(open) = self.open.pop_front() else { break };
             let near = |k: &&Key| (k.path_m - open.path_m).abs() <= CONTENT_REACH_M;
             let sweeps: Vec<(Pose2, &Sweep)> = self

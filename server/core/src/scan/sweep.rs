@@ -117,7 +117,10 @@ fn hits(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Vec<Hit> {
 }
 
 fn ignored(laser: &Laser, bearing_rad: f64) -> bool {
-    laser.ignored_rad.iter().any(|(from, to)| (bearing_rad - from).rem_euclid(TAU) <= (to - from).rem_euclid(TAU))
+    laser
+        .ignored_rad
+        .iter()
+        .any(|(from, to)| (bearing_rad - from).rem_euclid(TAU) <= (to - from).rem_euclid(TAU))
 }
 
 /// Total least squares over neighbouring beams, oriented towards the laser; zero where the
@@ -143,7 +146,9 @@ fn normal(hits: &[Hit], k: usize, step_rad: f64) -> (f64, f64) {
         for step in 1..=NORMAL_REACH {
             let Some(i) = (if ahead { Some(k + step) } else { k.checked_sub(step) }) else { break };
             let Some(h) = hits.get(i) else { break };
-            if h.beam.abs_diff(here.beam) > NORMAL_REACH + 1 || (h.x_m - last.x_m).hypot(h.y_m - last.y_m) > gap_m {
+            if h.beam.abs_diff(here.beam) > NORMAL_REACH + 1
+                || (h.x_m - last.x_m).hypot(h.y_m - last.y_m) > gap_m
+            {
                 break;
             }
             add(h);
