@@ -1,6 +1,33 @@
 //! # toponym
 //!
-//! Client library of the toponym mapping server.
+//! Client library of the toponym mapping server: three roles over Zenoh, readers of recorded
+//! logs, and a simulator.
+//!
+//! - [`Robot`] streams odometry and scans and knows what the server has taken in;
+//! - [`Guide`] says what places are called and hears what became of it;
+//! - [`Planner`] asks where places are;
+//! - [`log`] reads recorded robots, [`sim`] makes up new ones.
+//!
+//! ```no_run
+//! # async fn f() -> Result<(), toponym::ClientError> {
+//! use std::time::Duration;
+//! let session = toponym::open(&toponym::endpoint(None)).await?;
+//! let planner = toponym::Planner::new(&session, "default", "main", Duration::from_secs(5))?;
+//! for candidate in planner.where_is("gym").await?.candidates {
+//!     println!("{:.2} at {:.1}, {:.1}", candidate.probability, candidate.x_m, candidate.y_m);
+//! }
+//! # Ok(())
+//! # }
+//! ```
 
+pub mod guide;
 pub mod log;
+pub mod planner;
+pub mod robot;
+pub mod session;
 pub mod sim;
+
+pub use guide::Guide;
+pub use planner::Planner;
+pub use robot::{Form, Robot, RobotConfig};
+pub use session::{ClientError, endpoint, open};

@@ -1,0 +1,339 @@
+//! The robot's role: streams setup, odometry and scans, and knows what the server has.
+//!
+//! A publication that went well proves nothing. What counts is the server's watermark on
+//! `out/ack`; whatever is above it is kept here and sent again when the watermark stands still.
+
+use crate::session::{ClientError, ask};
+use std::collections::{BTreeMap, VecDeque};
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use tokio::sync::watch;
+use tokio::time::{Instant, timeout_at};
+use toponym_proto::answer::{Ack, Problem, RobotState};
+use toponym_proto::codec::{ENCODING_BINCODE, ENCODING_JSON};
+use toponym_proto::keys::{DEFAULT_SITE, check_id};
+use toponym_proto::{Clock, End, Header, Invalid, Keys, Limits, Message, Odom, Pose, Scan, Setup, Stamp};
+use tracing::warn;
+use zenoh::Session;
+use zenoh::bytes::ZBytes;
+use zenoh::pubsub::Subscriber;
+use zenoh::qos::CongestionControl;
+use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, MissDetectionConfig};
+
+/// Lets a server notice that the last message is missing.
+const HEARTBEAT: Duration = Duration::from_millis(500);
+/// A watermark that stands still so long means that something got lost; doubles each time.
+const RESEND_AFTER: Duration = Duration::from_secs(2);
+/// How long the server may take to tell its watermark when asked.
+const ASK_WAIT: Duration = Duration::from_secs(1);
+
+/// Form of the payloads.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Form {
+    /// Short and quick.
+    #[default]
+    Bincode,
+    /// Readable.
+    Json,
+}
+
+/// Settings of a [`Robot`].
+#[derive(Clone, Debug)]
+pub struct RobotConfig {
+    /// Site.
+    pub site: String,
+    /// Robot id.
+    pub robot: String,
+    /// Grows with each start; the Unix time of now in seconds.
+    pub boot: u64,
+    /// Which clock the stamps are of.
+    pub clock: Clock,
+    /// Form of the payloads.
+    pub form: Form,
+    /// Messages kept until they are acknowledged; sending waits while there are so many.
+    pub in_flight_max: usize,
+    /// How long the watermark may stand still before sending fails.
+    pub patience: Duration,
+}
+
+impl RobotConfig {
+    /// The defaults for a robot.
+    pub fn new(robot: &str) -> Self {
+        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        Self {
+            site: DEFAULT_SITE.into(),
+            robot: robot.into(),
+            boot: since_1970.as_secs(),
+            clock: Clock::Unix,
+            form: Form::Bincode,
+            in_flight_max: 4096,
+            patience: Duration::from_secs(60),
+        }
+    }
+}
+
+/// A message that isn't acknowledged yet.
+struct Unacked {
+    seq: u64,
+    key: String,
+    bytes: ZBytes,
+}
+
+/// One robot's streams, from one start of the robot to its end.
+pub struct Robot {
+    session: Session,
+    config: RobotConfig,
+    keys: Keys,
+    /// Seq of the next message.
+    next: u64,
+    publishers: BTreeMap<String, AdvancedPublisher<'static>>,
+    unacked: VecDeque<Unacked>,
+    /// When the watermark last moved, or the first message after it was sent.
+    moved: Instant,
+    resend_after: Duration,
+    acks: watch::Receiver<Option<Ack>>,
+    states: watch::Receiver<Option<RobotState>>,
+    _subscribers: [Subscriber<()>; 2],
+}
+
+impl Robot {
+    /// Gets ready to send; the first message should be a [`Setup`].
+    ///
+    /// # Errors
+    /// If site or robot are no ids; Zenoh's own.
+    pub async fn connect(session: &Session, config: RobotConfig) -> Result<Self, ClientError> {
+        check_id("robot", &config.robot)?;
+        let keys = Keys::new(&config.site)?;
+        let (acks, on_ack) = latest(session, keys.ack(&config.robot)).await?;
+        let (states, on_state) = latest(session, keys.state(&config.robot)).await?;
+        Ok(Self {
+            session: session.clone(),
+            config,
+            keys,
+            next: 0,
+            publishers: BTreeMap::new(),
+            unacked: VecDeque::new(),
+            moved: Instant::now(),
+            resend_after: RESEND_AFTER,
+            acks,
+            states,
+            _subscribers: [on_ack, on_state],
+        })
+    }
+
+    /// Presents the robot: its header needs no more than a stamp.
+    pub async fn setup(&mut self, setup: Setup) -> Result<u64, ClientError> {
+        self.send(Message::Setup(setup)).await
+    }
+
+    /// Sends wheel odometry.
+    pub async fn odom(&mut self, stamp: Stamp, odom_from_body: Pose) -> Result<u64, ClientError> {
+        let header = Header { stamp, ..Header::default() };
+        self.send(Message::Odom(Odom { header, odom_from_body })).await
+    }
+
+    /// Sends a sweep: its header needs no more than a stamp.
+    pub async fn scan(&mut self, scan: Scan) -> Result<u64, ClientError> {
+        self.send(Message::Scan(scan)).await
+    }
+
+    /// Tells that the stream ends: nothing is waited for any more.
+    pub async fn end(&mut self, stamp: Stamp) -> Result<u64, ClientError> {
+        self.send(Message::End(End { header: Header { stamp, ..Header::default() } })).await
+    }
+
+    /// Sends a message of the robot's; all of its header but the stamp is filled in here. Returns
+    /// its seq. Waits while too much is unacknowledged.
+    ///
+    /// # Errors
+    /// If the protocol refuses the message (nothing is sent then), the server refuses the robot,
+    /// or acknowledges nothing for longer than the patience set.
+    pub async fn send(&mut self, mut message: Message) -> Result<u64, ClientError> {
+        let seq = self.next;
+        let (robot, boot, clock) = (self.config.robot.clone(), self.config.boot, self.config.clock);
+        let Some(header) = header_mut(&mut message) else {
+            return Err(Invalid::new("message", "is a sentence: these are a guide's").into());
+        };
+        *header = Header { robot, boot, seq, clock, stamp: header.stamp };
+        message.validate(&Limits::default())?;
+        let (key, bytes) = self.encoded(&message)?;
+        self.drop_acked();
+        while self.unacked.len() >= self.config.in_flight_max {
+            self.progress().await?;
+        }
+        if self.unacked.is_empty() {
+            self.moved = Instant::now();
+        }
+        self.unacked.push_back(Unacked { seq, key: key.clone(), bytes: bytes.clone() });
+        self.next += 1;
+        self.put(&key, bytes).await?;
+        self.check_refused()?;
+        Ok(seq)
+    }
+
+    /// Waits until everything sent is acknowledged.
+    ///
+    /// # Errors
+    /// As [`Robot::send`].
+    pub async fn settle(&mut self) -> Result<(), ClientError> {
+        self.drop_acked();
+        while !self.unacked.is_empty() {
+            self.progress().await?;
+        }
+        self.check_refused()
+    }
+
+    /// Messages sent that are not acknowledged yet.
+    pub fn in_flight(&self) -> usize {
+        self.unacked.len()
+    }
+
+    /// The newest watermark of this boot.
+    pub fn acked(&self) -> Option<Ack> {
+        self.acks.borrow().clone().filter(|ack| ack.boot == self.config.boot)
+    }
+
+    /// How the server gets along with this boot, as told last.
+    pub fn state(&self) -> Option<RobotState> {
+        self.states.borrow().clone().filter(|state| state.boot == Some(self.config.boot))
+    }
+
+    fn encoded(&self, message: &Message) -> Result<(String, ZBytes), ClientError> {
+        let robot = &self.config.robot;
+        let key = match message {
+            Message::Scan(scan) => self.keys.scan(robot, &scan.laser),
+            Message::Odom(_) => self.keys.odom(robot),
+            Message::End(_) => self.keys.end(robot),
+            Message::Setup(_) | Message::Say(_) => self.keys.setup(robot),
+        };
+        let bytes = match self.config.form {
+            Form::Bincode => message.to_bincode(),
+            Form::Json => message.to_json(),
+        };
+        match bytes {
+            Ok(bytes) => Ok((key, bytes.into())),
+            Err(e) => Err(ClientError::Unreadable { key, why: e.to_string() }),
+        }
+    }
+
+    async fn put(&mut self, key: &str, bytes: ZBytes) -> Result<(), ClientError> {
+        if !self.publishers.contains_key(key) {
+            let publisher = self.publisher(key).await?;
+            self.publishers.insert(key.into(), publisher);
+        }
+        if let Some(publisher) = self.publishers.get(key)
+            && let Err(e) = publisher.put(bytes).await
+        {
+            // It stays in flight and is sent again.
+            warn!(key, "could not be sent now: {e}");
+        }
+        Ok(())
+    }
+
+    async fn publisher(&self, key: &str) -> Result<AdvancedPublisher<'static>, ClientError> {
+        let encoding = match self.config.form {
+            Form::Bincode => ENCODING_BINCODE,
+            Form::Json => ENCODING_JSON,
+        };
+        Ok(self
+            .session
+            .declare_publisher(key.to_owned())
+            .encoding(encoding)
+            .congestion_control(CongestionControl::Block)
+            .cache(CacheConfig::default().max_samples(self.config.in_flight_max))
+            .sample_miss_detection(MissDetectionConfig::default().heartbeat(HEARTBEAT))
+            .publisher_detection()
+            .await?)
+    }
+
+    fn drop_acked(&mut self) {
+        let Some(ack) = self.acked() else { return };
+        let before = self.unacked.len();
+        while self.unacked.front().is_some_and(|m| m.seq <= ack.seq) {
+            self.unacked.pop_front();
+        }
+        if self.unacked.len() < before {
+            (self.moved, self.resend_after) = (Instant::now(), RESEND_AFTER);
+        }
+    }
+
+    fn check_refused(&self) -> Result<(), ClientError> {
+        match self.state() {
+            Some(RobotState { map: None, error: Some(problem), .. }) => Err(ClientError::Refused(problem)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Waits for the watermark to move; when it stands still, asks for it and sends again what is
+    /// above it.
+    async fn progress(&mut self) -> Result<(), ClientError> {
+        let deadline = (self.moved + self.resend_after).min(self.moved + self.config.patience);
+        let told = timeout_at(deadline, async {
+            tokio::select! {
+                told = self.acks.changed() => told,
+                told = self.states.changed() => told,
+            }
+        });
+        if told.await.is_ok() {
+            self.check_refused()?;
+            self.drop_acked();
+            return Ok(());
+        }
+        if self.moved.elapsed() >= self.config.patience {
+            let what = format!("acknowledgement of {} messages", self.unacked.len());
+            return Err(ClientError::Timeout { what, after: self.config.patience });
+        }
+        self.resend_after *= 2;
+        let asked: Result<Ack, _> =
+            ask(&self.session, &self.keys.ack(&self.config.robot), "", ASK_WAIT).await;
+        match asked {
+            Ok(ack) if ack.boot == self.config.boot => {
+                while self.unacked.front().is_some_and(|m| m.seq <= ack.seq) {
+                    self.unacked.pop_front();
+                    (self.moved, self.resend_after) = (Instant::now(), RESEND_AFTER);
+                }
+            }
+            Ok(_) => {}
+            Err(e) => warn!("the watermark is not known: {e}"),
+        }
+        let again: Vec<(String, ZBytes)> =
+            self.unacked.iter().map(|m| (m.key.clone(), m.bytes.clone())).collect();
+        for (key, bytes) in again {
+            self.put(&key, bytes).await?;
+        }
+        Ok(())
+    }
+
+    /// What the server last complained of in this boot's messages, if anything.
+    pub fn complaint(&self) -> Option<Problem> {
+        self.state().and_then(|state| state.error)
+    }
+}
+
+/// The newest value published on a key.
+async fn latest<T>(
+    session: &Session,
+    key: String,
+) -> Result<(watch::Receiver<Option<T>>, Subscriber<()>), ClientError>
+where
+    T: serde::de::DeserializeOwned + Send + Sync + 'static,
+{
+    let (sender, receiver) = watch::channel(None);
+    let subscriber = session
+        .declare_subscriber(key)
+        .callback(move |sample| match serde_json::from_slice(&sample.payload().to_bytes()) {
+            Ok(value) => drop(sender.send_replace(Some(value))),
+            Err(e) => warn!(key = sample.key_expr().as_str(), "unreadable: {e}"),
+        })
+        .await?;
+    Ok((receiver, subscriber))
+}
+
+fn header_mut(message: &mut Message) -> Option<&mut Header> {
+    match message {
+        Message::Setup(m) => Some(&mut m.header),
+        Message::Odom(m) => Some(&mut m.header),
+        Message::Scan(m) => Some(&mut m.header),
+        Message::End(m) => Some(&mut m.header),
+        Message::Say(_) => None,
+    }
+}
