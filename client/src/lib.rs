@@ -23,11 +23,13 @@
 pub mod guide;
 pub mod log;
 pub mod planner;
+pub mod replay;
 pub mod robot;
 pub mod session;
 pub mod sim;
 
 pub use guide::Guide;
 pub use planner::Planner;
+pub use replay::Replay;
 pub use robot::{Form, Robot, RobotConfig};
 pub use session::{ClientError, endpoint, open};

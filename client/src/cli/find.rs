@@ -1,0 +1,192 @@
+//! `toponym where` and `toponym labels`.
+
+use super::{Failure, exit};
+use std::fmt::Write as _;
+use std::io::Write as _;
+use std::time::Duration;
+use toponym::Planner;
+use toponym_proto::answer::{Candidate, LabelsReply, WhereReply};
+
+/// Less likely alternatives are left out of the text (not of the JSON).
+const SHOWN_MIN: f64 = 0.005;
+
+/// Arguments of `where`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  toponym where gym
+  toponym where 'elevator lobby' --json
+  toponym where 'where is the kitchen?' --map floor2 --timeout 1
+
+Bearings are from the robot's nose, left is positive. Exit code 1 if the name is not known.")]
+pub struct WhereArgs {
+    /// A name, or a whole question.
+    name: String,
+    /// Which map.
+    #[arg(long, default_value = "main")]
+    map: String,
+    /// Print the server's answer as it is.
+    #[arg(long)]
+    json: bool,
+    /// How long to wait for it.
+    #[arg(long, value_name = "S", default_value = "5", value_parser = super::seconds)]
+    timeout: Duration,
+}
+
+/// Arguments of `labels`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example:
+  toponym labels --map floor2")]
+pub struct LabelsArgs {
+    /// Which map.
+    #[arg(long, default_value = "main")]
+    map: String,
+    /// Print the server's answer as it is.
+    #[arg(long)]
+    json: bool,
+    /// How long to wait for it.
+    #[arg(long, value_name = "S", default_value = "5", value_parser = super::seconds)]
+    timeout: Duration,
+}
+
+pub async fn find(endpoint: &str, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
+    let session = toponym::open(endpoint).await?;
+    let planner = Planner::new(&session, site, &args.map, args.timeout)?;
+    let reply = planner.where_is(&args.name).await?;
+    print(&if args.json { json(&reply)? } else { where_text(&reply) })?;
+    Ok(if reply.candidates.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
+}
+
+pub async fn labels(endpoint: &str, site: &str, args: &LabelsArgs) -> Result<u8, Failure> {
+    let session = toponym::open(endpoint).await?;
+    let planner = Planner::new(&session, site, &args.map, args.timeout)?;
+    let reply = planner.labels().await?;
+    print(&if args.json { json(&reply)? } else { labels_text(&reply) })?;
+    Ok(if reply.labels.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
+}
+
+fn json<T: serde::Serialize>(value: &T) -> Result<String, Failure> {
+    let text = serde_json::to_string_pretty(value).map_err(std::io::Error::from)?;
+    Ok(text + "\n")
+}
+
+/// Unlike `println!` this survives a reader that hangs up, such as `head`.
+fn print(text: &str) -> Result<(), Failure> {
+    Ok(std::io::stdout().write_all(text.as_bytes())?)
+}
+
+fn where_text(reply: &WhereReply) -> String {
+    let Some((best, others)) = reply.candidates.split_first() else {
+        return format!("{}: not known here; `toponym labels` lists what is\n", reply.name);
+    };
+    let mut text = format!("{}: {}\n", best.label, candidate_text(best));
+    let shown = others.iter().filter(|c| c.probability >= SHOWN_MIN);
+    for other in shown {
+        let _ = writeln!(text, "  or {}: {}", other.label, candidate_text(other));
+    }
+    if reply.p_none >= SHOWN_MIN {
+        let _ = writeln!(text, "  or nowhere in the map: probability {:.2}", reply.p_none);
+    }
+    text
+}
+
+fn candidate_text(c: &Candidate) -> String {
+    let from_robot = c.from_robot.as_ref().map_or(String::new(), |from| {
+        let side = if from.bearing_rad < 0.0 { "right" } else { "left" };
+        let degrees = from.bearing_rad.to_degrees().abs();
+        format!("{:.1} m away, {degrees:.0}° to the {side}, ", from.distance_m)
+    });
+    format!("{from_robot}probability {:.2} (x {:.2} m, y {:.2} m)", c.probability, c.x_m, c.y_m)
+}
+
+fn labels_text(reply: &LabelsReply) -> String {
+    if reply.labels.is_empty() {
+        return format!("map {} was told no names yet\n", reply.map.id);
+    }
+    let width = reply.labels.iter().map(|l| l.label.chars().count()).max().unwrap_or(0);
+    let mut text = String::new();
+    for label in &reply.labels {
+        let times = if label.utterances == 1 { "time" } else { "times" };
+        let (name, n, region) = (&label.label, label.utterances, label.region);
+        let _ = writeln!(text, "{name:width$}  said {n} {times}, most likely place {region}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use toponym_proto::answer::{FromRobot, LabelEntry, MapIdentity, Resolved};
+
+    fn candidate(probability: f64, bearing_rad: Option<f64>) -> Candidate {
+        Candidate {
+            region: 1,
+            label: "gym".into(),
+            probability,
+            p_is: 0.9,
+            x_m: 1.0,
+            y_m: -2.0,
+            yaw_rad: 0.0,
+            cov: [0.0; 9],
+            polygon_m: Vec::new(),
+            goal: None,
+            from_robot: bearing_rad.map(|bearing_rad| FromRobot {
+                robot: "r".into(),
+                distance_m: 8.25,
+                bearing_rad,
+            }),
+            because: Vec::new(),
+        }
+    }
+
+    fn reply(candidates: Vec<Candidate>) -> WhereReply {
+        WhereReply {
+            v: 1,
+            query: "where".into(),
+            name: "gym".into(),
+            resolved: Resolved::default(),
+            map: MapIdentity::default(),
+            stamp: toponym_proto::Stamp::default(),
+            p_none: 0.1,
+            candidates,
+        }
+    }
+
+    #[test]
+    fn where_tells_distance_bearing_probability_and_alternatives() {
+        let text = where_text(&reply(vec![
+            candidate(0.7, Some(0.5)),
+            candidate(0.2, Some(-0.5)),
+            candidate(0.0, None),
+        ]));
+        assert_eq!(
+            text,
+            "gym: 8.2 m away, 29° to the left, probability 0.70 (x 1.00 m, y -2.00 m)\n  \
+             or gym: 8.2 m away, 29° to the right, probability 0.20 (x 1.00 m, y -2.00 m)\n  \
+             or nowhere in the map: probability 0.10\n"
+        );
+    }
+
+    #[test]
+    fn an_unknown_name_is_told_as_such() {
+        assert!(where_text(&reply(Vec::new())).starts_with("gym: not known here"));
+    }
+
+    #[test]
+    fn labels_are_a_table() {
+        let label = |label: &str, utterances| LabelEntry { label: label.into(), utterances, region: 3 };
+        let mut reply = LabelsReply {
+            v: 1,
+            query: "labels".into(),
+            map: MapIdentity { id: "main".into(), ..MapIdentity::default() },
+            labels: vec![label("gym", 1), label("kitchen", 2)],
+        };
+        assert_eq!(
+            labels_text(&reply),
+            "gym      said 1 time, most likely place 3\nkitchen  said 2 times, most likely place 3\n"
+        );
+        reply.labels.clear();
+        assert!(labels_text(&reply).contains("no names yet"));
+    }
+}
