@@ -75,7 +75,7 @@ pub struct HoldBack {
     /// [`HoldBack::PATIENCE`] holds for the stream to go on.
     last_sentence: Duration,
     /// Newest stamp that arrived.
-    newest: Stamp,
+    newest: Option<Stamp>,
     /// Newest stamp that went out.
     passed: Option<Stamp>,
 }
@@ -84,30 +84,29 @@ impl HoldBack {
     /// Holds that a sentence ahead of its stream waits for the stream to catch up.
     pub const PATIENCE: u32 = 10;
 
-    /// With nothing in it.
-    pub fn new(hold: Duration) -> Self {
+    /// With nothing in it. `newest`: newest stamp of a stream that goes on, if it does.
+    pub fn new(hold: Duration, newest: Option<Stamp>) -> Self {
         Self {
             hold,
             held: VecDeque::new(),
             sentences: Sentences::default(),
             last_sentence: Duration::ZERO,
-            newest: Stamp { ns: i64::MIN },
-            passed: None,
+            newest,
+            passed: newest,
         }
     }
 
     /// Takes in the stream's next message, in the order of `seq`.
     pub fn push(&mut self, now: Duration, message: Message) {
         if let Some(header) = message.header() {
-            self.newest = self.newest.max(header.stamp);
+            self.newest = self.newest.max(Some(header.stamp));
         }
         self.held.push_back((now, message));
     }
 
     /// Takes in a sentence.
     pub fn push_say(&mut self, now: Duration, say: Say) {
-        let stream_now = if self.newest.ns == i64::MIN { Stamp::default() } else { self.newest };
-        self.sentences.push(say, stream_now);
+        self.sentences.push(say, self.newest.unwrap_or_default());
         self.last_sentence = now;
     }
 
@@ -240,7 +239,7 @@ mod tests {
                 all.push((at, usize::MAX, Message::Say(s.clone())));
             }
             all.sort_by_key(|(t, i, _)| (*t, *i));
-            let (mut hold, mut got) = (HoldBack::new(HOLD), Vec::new());
+            let (mut hold, mut got) = (HoldBack::new(HOLD, None), Vec::new());
             for (t, _, m) in all {
                 let now = Duration::from_millis(t);
                 match m {
@@ -256,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_message_is_held_and_then_let_go() {
-        let mut hold = HoldBack::new(HOLD);
+        let mut hold = HoldBack::new(HOLD, None);
         hold.push(Duration::from_secs(1), odom(0, 5));
         assert_eq!(hold.pop(Duration::from_millis(1499)), None);
         assert_eq!(hold.pop(Duration::from_millis(1500)), Some(odom(0, 5)));
@@ -265,7 +264,7 @@ mod tests {
 
     #[test]
     fn a_late_sentence_enters_at_once() {
-        let mut hold = HoldBack::new(HOLD);
+        let mut hold = HoldBack::new(HOLD, None);
         hold.push(Duration::ZERO, odom(0, 5));
         assert!(hold.pop(HOLD).is_some());
         hold.push(HOLD, odom(1, 6));
@@ -275,7 +274,7 @@ mod tests {
 
     #[test]
     fn a_sentence_ahead_of_a_silent_stream_enters_in_the_end() {
-        let mut hold = HoldBack::new(HOLD);
+        let mut hold = HoldBack::new(HOLD, None);
         hold.push_say(Duration::ZERO, say(0, 100));
         assert_eq!(hold.pop(HOLD), None);
         assert_eq!(hold.pop(HOLD * HoldBack::PATIENCE), Some(Message::Say(say(0, 100))));
@@ -283,7 +282,7 @@ mod tests {
 
     #[test]
     fn a_sentence_without_a_time_is_said_now() {
-        let mut hold = HoldBack::new(HOLD);
+        let mut hold = HoldBack::new(HOLD, None);
         hold.push(Duration::ZERO, odom(0, 7));
         hold.push_say(Duration::ZERO, Say { began: None, ..say(0, 0) });
         let mut got = Vec::new();
@@ -292,9 +291,18 @@ mod tests {
     }
 
     #[test]
+    fn a_stream_that_goes_on_lends_its_time() {
+        let mut hold = HoldBack::new(HOLD, Some(Stamp { ns: 70 }));
+        hold.push_say(Duration::ZERO, say(0, 60));
+        assert_eq!(hold.pop(Duration::ZERO), Some(Message::Say(say(0, 60))));
+        hold.push_say(Duration::ZERO, Say { began: None, ..say(1, 0) });
+        assert_eq!(hold.pop(Duration::MAX), Some(Message::Say(say(1, 70))));
+    }
+
+    #[test]
     fn the_end_comes_after_all_that_was_said() {
         let end = || Message::End(End { header: Header { robot: "r1".into(), ..Default::default() } });
-        let mut hold = HoldBack::new(HOLD);
+        let mut hold = HoldBack::new(HOLD, None);
         hold.push(Duration::ZERO, odom(0, 7));
         hold.push(Duration::ZERO, end());
         hold.push_say(Duration::ZERO, say(0, 1_000_000));

@@ -270,6 +270,6 @@ mod tests {
         let reply = where_reply(answer, MapIdentity::default(), Stamp { ns: 1 }, "r07");
         let from = reply.candidates[0].from_robot.as_ref().unwrap();
         assert!((from.distance_m - 3.0).abs() < 1e-12 && from.bearing_rad.abs() < 1e-12);
-        assert!(reply.candidates[0].cov.iter().enumerate().all(|(k, c)| *c == k as f64));
+        assert_eq!(reply.candidates[0].cov.map(|c| c as u32), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
     }
 }

@@ -21,6 +21,8 @@ pub struct Card {
     pub robot: String,
     /// (boot, seq) of the last message in it.
     pub watermark: Option<(u64, u64)>,
+    /// Newest stamp in it, ns.
+    pub stamp_ns: i64,
 }
 
 /// The data folder can't be used.
@@ -111,5 +113,67 @@ impl Store {
         let path = self.folder.join(name);
         fs::rename(&aside, &path).map_err(io_error(&path))?;
         File::open(&self.folder).and_then(|folder| folder.sync_all()).map_err(io_error(&self.folder))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn folder(name: &str) -> PathBuf {
+        let path = std::env::temp_dir().join(format!("toponym-store-{}-{name}", std::process::id()));
+        let _ = fs::remove_dir_all(&path);
+        path
+    }
+
+    fn card() -> Card {
+        Card { uuid: "u".into(), robot: "r1".into(), watermark: Some((1, 2)), stamp_ns: 3 }
+    }
+
+    #[test]
+    fn what_was_saved_is_loaded() {
+        let path = folder("saved");
+        let store = Store::open(&path).unwrap();
+        let map = Mapper::new(toponym_core::Config::default()).save().unwrap();
+        store.save("main", &map, &card()).unwrap();
+        store.save("main", &map, &Card { watermark: Some((1, 9)), ..card() }).unwrap();
+        let maps = store.load().unwrap();
+        let (mapper, known) = &maps["main"];
+        assert_eq!((mapper.save().unwrap() == map, known.watermark), (true, Some((1, 9))));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn what_is_half_written_does_not_count() {
+        let path = folder("half");
+        let store = Store::open(&path).unwrap();
+        let map = Mapper::new(toponym_core::Config::default()).save().unwrap();
+        store.save("main", &map, &card()).unwrap();
+        fs::write(path.join("main.map.new"), b"half").unwrap();
+        fs::write(path.join("main.json.new"), b"half").unwrap();
+        assert_eq!(store.load().unwrap()["main"].1, card());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_broken_file_is_named() {
+        let path = folder("broken");
+        let store = Store::open(&path).unwrap();
+        let map = Mapper::new(toponym_core::Config::default()).save().unwrap();
+        store.save("main", &map, &card()).unwrap();
+        fs::write(path.join("main.json"), b"{").unwrap();
+        let error = store.load().unwrap_err().to_string();
+        assert!(error.contains("main.json") && error.contains("move it away"), "{error}");
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_folder_has_one_owner() {
+        let path = folder("owner");
+        let first = Store::open(&path).unwrap();
+        assert!(matches!(Store::open(&path), Err(StoreError::InUse(_))));
+        drop(first);
+        Store::open(&path).unwrap();
+        fs::remove_dir_all(path).unwrap();
     }
 }

@@ -1,3 +1,8 @@
-//! End-to-end tests over the real path.
-#[test]
-fn placeholder() {}
+//! End-to-end tests: a server in this process, clients over loopback, one binary for all.
+
+#![allow(clippy::unwrap_used, reason = "a test says by a panic that it has failed")]
+
+mod lifetime;
+mod questions;
+mod site;
+mod streams;

@@ -208,8 +208,8 @@ impl Intake {
                 error!(robot = id, robots_max = self.config.robots_max, "refused: too many robots");
                 return None;
             }
-            let watermark = self.maps.watermark(id);
-            self.robots.insert(id.into(), Robot::new(id, &self.config, watermark));
+            let robot = Robot::new(id, &self.config, self.maps.saved(id));
+            self.robots.insert(id.into(), robot);
         }
         self.robots.get_mut(id)
     }

@@ -121,6 +121,7 @@ impl Mapping {
         }
         if let Some(header) = message.header() {
             self.card.watermark = Some((header.boot, header.seq));
+            self.card.stamp_ns = header.stamp.ns;
             self.view.stamp_ns.store(header.stamp.ns, Ordering::Relaxed);
         }
         let effects = self.mapper.step(convert::event(message));

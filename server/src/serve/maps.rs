@@ -33,8 +33,8 @@ pub struct Maps {
     store: Arc<Store>,
     record: Option<PathBuf>,
     threads: Vec<JoinHandle<()>>,
-    /// (boot, seq) that the saved maps have of each robot.
-    watermarks: BTreeMap<String, (u64, u64)>,
+    /// The saved map of each robot that it was on last, and (boot, seq) of the last message in it.
+    saved: BTreeMap<String, (Arc<MapView>, (u64, u64))>,
 }
 
 impl Maps {
@@ -46,7 +46,7 @@ impl Maps {
         store: Arc<Store>,
         record: Option<PathBuf>,
     ) -> Self {
-        Self { config, board, outbox, store, record, threads: Vec::new(), watermarks: BTreeMap::new() }
+        Self { config, board, outbox, store, record, threads: Vec::new(), saved: BTreeMap::new() }
     }
 
     /// Starts a thread for each saved map.
@@ -56,18 +56,20 @@ impl Maps {
             if self.record.is_some() {
                 warn!(map = id, "the record begins in the middle of this map: replay it with --start-map");
             }
-            if let Some(watermark) = card.watermark {
-                let known = self.watermarks.entry(card.robot.clone()).or_insert(watermark);
-                *known = watermark.max(*known);
+            let (robot, watermark) = (card.robot.clone(), card.watermark);
+            let view = self.start(&id, mapper, card)?;
+            if let Some(watermark) = watermark
+                && self.saved.get(&robot).is_none_or(|(_, known)| *known < watermark)
+            {
+                self.saved.insert(robot, (view, watermark));
             }
-            self.start(&id, mapper, card)?;
         }
         Ok(())
     }
 
-    /// What the saved maps have of a robot's stream.
-    pub fn watermark(&self, robot: &str) -> Option<(u64, u64)> {
-        self.watermarks.get(robot).copied()
+    /// The map that a robot was on in an earlier run, and how far it got.
+    pub fn saved(&self, robot: &str) -> Option<(Arc<MapView>, (u64, u64))> {
+        self.saved.get(robot).cloned()
     }
 
     /// The map that a robot's setup names, new if there is none. A map has one robot.
@@ -89,7 +91,7 @@ impl Maps {
                 .field("map")
                 .hint("raise maps_max in the server's configuration"));
         }
-        let card = Card { uuid: new_uuid(), robot: robot.clone(), watermark: None };
+        let card = Card { uuid: new_uuid(), robot: robot.clone(), watermark: None, stamp_ns: 0 };
         self.start(id, Mapper::new(self.config.mapper.clone()), card)
             .map_err(|e| Problem::new(ErrorCode::Internal, format!("map {id:?} could not be started: {e}")))
     }
@@ -105,7 +107,7 @@ impl Maps {
             uuid: card.uuid.clone(),
             robot: card.robot.clone(),
             snapshot: arc_swap::ArcSwap::new(mapper.snapshot()),
-            stamp_ns: AtomicI64::new(0),
+            stamp_ns: AtomicI64::new(card.stamp_ns),
             recorded: Mutex::default(),
             work,
         });

@@ -34,25 +34,32 @@ pub struct Robot {
     /// (boot, seq) of the last message handed to the map, or given up.
     watermark: Option<(u64, u64)>,
     counts: Counts,
-    error: Option<Problem>,
+    /// Why it has no map.
+    no_map: Option<Problem>,
+    /// Why the last refused message was refused.
+    refusal: Option<Problem>,
     queue_messages: usize,
 }
 
 impl Robot {
-    /// `watermark`: what a saved map has of this robot already.
-    pub fn new(id: &str, config: &ServerConfig, watermark: Option<(u64, u64)>) -> Self {
+    /// `saved`: its map of an earlier run, and (boot, seq) of the last message in it; the robot need
+    /// not present itself again.
+    pub fn new(id: &str, config: &ServerConfig, saved: Option<(Arc<MapView>, (u64, u64))>) -> Self {
+        let (map, watermark) = saved.unzip();
+        let newest = map.as_ref().map(|map| map.stamp());
         let gap_wait = Duration::from_secs_f64(config.gap_wait_s);
         Self {
             id: id.into(),
             sequencer: Sequencer::new(gap_wait, config.gap_window, watermark),
-            hold: HoldBack::new(Duration::from_secs_f64(config.hold_back_s)),
+            hold: HoldBack::new(Duration::from_secs_f64(config.hold_back_s), newest),
             parked: None,
             outgoing: VecDeque::new(),
-            map: None,
+            map,
             boot: watermark.map(|w| w.0),
             watermark,
             counts: Counts::default(),
-            error: None,
+            no_map: None,
+            refusal: None,
             queue_messages: config.queue_messages,
         }
     }
@@ -81,7 +88,7 @@ impl Robot {
     /// Counts a refusal; the newest is told in the robot's state.
     pub fn refuse(&mut self, problem: Problem) {
         self.counts.refused += 1;
-        self.error = Some(problem);
+        self.refusal = Some(problem);
     }
 
     /// Moves on what is due at `now`, or everything if the stream is to `finish`.
@@ -116,11 +123,11 @@ impl Robot {
             match find_map(setup) {
                 Ok(map) => {
                     info!(robot = self.id, map = map.id, "maps");
-                    (self.map, self.error) = (Some(map), None);
+                    (self.map, self.no_map) = (Some(map), None);
                 }
                 Err(problem) => {
                     error!(robot = self.id, map = setup.map, "refused: {problem}");
-                    (self.map, self.error) = (None, Some(problem));
+                    (self.map, self.no_map) = (None, Some(problem));
                 }
             }
         }
@@ -129,7 +136,7 @@ impl Robot {
             return true;
         }
         self.counts.refused += 1;
-        self.error.get_or_insert_with(|| {
+        self.no_map.get_or_insert_with(|| {
             Problem::new(ErrorCode::BadArgument, "a message came before the robot's setup")
                 .field("setup")
                 .hint("publish in/setup first, with seq 0, and keep it in the publisher's cache")
@@ -178,7 +185,7 @@ impl Robot {
         let message = format!("map {:?} has stopped: see the server's log", map.id);
         error!(robot = self.id, "DATA LOSS: {message}");
         self.counts.refused += 1;
-        self.error = Some(Problem::new(ErrorCode::Internal, message));
+        self.no_map = Some(Problem::new(ErrorCode::Internal, message));
     }
 
     /// What is told on `out/ack`; nothing before the first message.
@@ -204,7 +211,7 @@ impl Robot {
             map: self.map.as_ref().map(|map| map.id.clone()),
             boot: self.boot,
             counts: Counts { repeated: dropped.repeated, stale: dropped.stale, ..self.counts },
-            error: self.error.clone(),
+            error: self.no_map.clone().or_else(|| self.refusal.clone()),
         }
     }
 }

@@ -1,0 +1,97 @@
+//! Start, stop, and what outlives them.
+
+use crate::site::{Folder, Site, drive, settings};
+use toponym_proto::answer::{GraphReply, Info};
+use toponym_server::serve::{Server, serve};
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_map_outlives_the_server() {
+    let folder = Folder::new();
+    let stream = drive("r1", "main");
+    let site = Site::start(settings(&folder)).await;
+    let acks = site.acks("r1").await;
+    for message in stream.iter().take(41) {
+        site.send(message).await;
+    }
+    acks.ack_of(40).await;
+    let info: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
+    site.stop().await;
+
+    // The robot doesn't know how much of it was taken, and sends all of it again.
+    let site = Site::start(settings(&folder)).await;
+    let (acks, states) = (site.acks("r1").await, site.states("r1").await);
+    for message in &stream {
+        site.send(message).await;
+    }
+    assert_eq!(acks.ack_of(81).await.lost, 0);
+    states.state(|s| s.counts.repeated == 41).await;
+    let again: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
+    assert_eq!(again.maps[0].uuid, info.maps[0].uuid);
+    site.stop().await;
+
+    // The map is the one of a run that was never interrupted.
+    let whole = Folder::new();
+    let site = Site::start(settings(&whole)).await;
+    let acks = site.acks("r1").await;
+    for message in &stream {
+        site.send(message).await;
+    }
+    acks.ack_of(81).await;
+    site.stop().await;
+    let map = |folder: &Folder| std::fs::read(folder.0.join("data/main.map")).unwrap();
+    assert!(map(&folder) == map(&whole));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn do_save_writes_the_map() {
+    let folder = Folder::new();
+    let site = Site::start(settings(&folder)).await;
+    let graphs = site.listen(site.keys.graph("main")).await;
+    for message in &drive("r1", "main") {
+        site.send(message).await;
+    }
+    graphs.until(|graph: &GraphReply| graph.places.len() > 3).await;
+    let done = site.ask(&site.keys.command("save"), "").await.unwrap();
+    assert_eq!(done["maps"][0], "main");
+    let saved = std::fs::read(folder.0.join("data/main.map")).unwrap();
+    assert!(toponym_core::Mapper::load(&saved).unwrap().snapshot().graph().places.len() > 3);
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_port_in_use_is_named() {
+    let (folder, other) = (Folder::new(), Folder::new());
+    let site = Site::start(settings(&folder)).await;
+    let mut config = settings(&other);
+    config.listen = site.server.endpoints().to_vec();
+    let error = Server::start(config.clone(), None).await.err().expect("an error").to_string();
+    assert!(error.contains(&config.listen[0]) && error.contains("in use"), "{error}");
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_data_folder_in_use_is_named() {
+    let folder = Folder::new();
+    let site = Site::start(settings(&folder)).await;
+    let error = Server::start(settings(&folder), None).await.err().expect("an error").to_string();
+    assert!(error.contains("another server uses this data folder"), "{error}");
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_broken_map_is_not_overwritten() {
+    let folder = Folder::new();
+    let config = settings(&folder);
+    std::fs::create_dir_all(&config.data).unwrap();
+    let path = config.data.join("main.map");
+    std::fs::write(&path, b"no map").unwrap();
+    let error = Server::start(config, None).await.err().expect("an error").to_string();
+    assert!(error.contains("main.map"), "{error}");
+    assert_eq!(std::fs::read(&path).unwrap(), b"no map");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn serving_ends_when_asked_to() {
+    let folder = Folder::new();
+    serve(settings(&folder), None, std::future::ready(())).await.unwrap();
+}

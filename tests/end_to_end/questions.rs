@@ -1,0 +1,100 @@
+//! Every query gets a reply, whatever is asked and whenever.
+
+use crate::site::{Folder, Site, drive, settings};
+use toponym_proto::answer::{ErrorCode, GraphReply, GridReply, Info, LabelsReply, PoseOut, WhereReply};
+use toponym_proto::keys::Ask;
+
+async fn mapped(folder: &Folder) -> Site {
+    let site = Site::start(settings(folder)).await;
+    let (acks, graphs) = (site.acks("r1").await, site.listen(site.keys.graph("main")).await);
+    for message in &drive("r1", "main") {
+        site.send(message).await;
+    }
+    acks.ack_of(81).await;
+    graphs.until(|graph: &GraphReply| graph.places.len() > 3).await;
+    site
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_map_answers() {
+    let folder = Folder::new();
+    let site = mapped(&folder).await;
+    let heard = site.listen(site.keys.heard("r1")).await;
+    let say = toponym_proto::Message::Say(crate::site::say(None, "s1", "this is the gym", None));
+    site.send_json(&say).await;
+    heard.heard("s1").await;
+
+    let ask = |what: Ask, arguments: &str| format!("{}?{arguments}", site.keys.ask("main", what));
+    let json = site.ask(&ask(Ask::Where, "name=gym"), "").await.unwrap();
+    let reply: WhereReply = serde_json::from_value(json).unwrap();
+    assert_eq!(reply.resolved.label.as_deref(), Some("gym"));
+    assert!(!reply.candidates.is_empty() && reply.candidates[0].from_robot.is_some());
+    let total: f64 = reply.p_none + reply.candidates.iter().map(|c| c.probability).sum::<f64>();
+    assert!((total - 1.0).abs() < 1e-6, "{reply:?}");
+    // The same as a JSON payload.
+    let json = site.ask(&ask(Ask::Where, ""), r#"{"text": "where is the gym"}"#).await.unwrap();
+    let question: WhereReply = serde_json::from_value(json).unwrap();
+    assert_eq!(question.candidates, reply.candidates);
+
+    // An unknown place is an answer.
+    let json = site.ask(&ask(Ask::Where, "name=swimming%20pool"), "").await.unwrap();
+    let reply: WhereReply = serde_json::from_value(json).unwrap();
+    assert_eq!((reply.p_none, reply.candidates.len()), (1.0, 0));
+
+    let json = site.ask(&ask(Ask::Labels, ""), "").await.unwrap();
+    let labels: LabelsReply = serde_json::from_value(json).unwrap();
+    assert_eq!(labels.labels[0].label, "gym");
+    let json = site.ask(&ask(Ask::Grid, "resolution_m=0.2"), "").await.unwrap();
+    let grid: GridReply = serde_json::from_value(json).unwrap();
+    assert!(grid.cells.len() == grid.width * grid.height && grid.cells.contains(&0), "{grid:?}");
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn who_comes_late_gets_the_newest() {
+    let folder = Folder::new();
+    let site = mapped(&folder).await;
+    let pose: PoseOut = serde_json::from_value(site.ask(&site.keys.pose("r1"), "").await.unwrap()).unwrap();
+    assert_eq!((pose.robot.as_str(), pose.map.id.as_str()), ("r1", "main"));
+    let graph: GraphReply =
+        serde_json::from_value(site.ask(&site.keys.graph("main"), "").await.unwrap()).unwrap();
+    let weight: f64 = graph.particles.iter().map(|p| p.weight).sum();
+    assert!((weight - 1.0).abs() < 1e-6);
+    assert_eq!(site.ask(&site.keys.ack("r1"), "").await.unwrap()["seq"], 81);
+    let info: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
+    assert_eq!((info.maps.len(), info.robots.len(), info.overrun), (1, 1, 0));
+    let tokens = site.session.liveliness().get(site.keys.alive("*")).await.unwrap();
+    assert!(tokens.recv_async().await.is_ok());
+    // Who doesn't know the map's name asks all.
+    let json = site.ask(&site.keys.ask("*", Ask::Labels), "").await.unwrap();
+    assert_eq!(json["query"], "labels");
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn every_wrong_question_gets_an_error() {
+    let folder = Folder::new();
+    let site = mapped(&folder).await;
+    let keys = &site.keys;
+    let wrong = [
+        (keys.ask("attic", Ask::Labels), "", ErrorCode::NoSuchMap, "map"),
+        (keys.ask("main", Ask::Where), "", ErrorCode::BadArgument, "name"),
+        (keys.ask("main", Ask::Where), "{\"name\": ", ErrorCode::BadArgument, "payload"),
+        (keys.ask("main", Ask::Where), "[1]", ErrorCode::BadArgument, "payload"),
+        (keys.ask("main", Ask::Where) + "?name=%zz", "", ErrorCode::BadArgument, "selector"),
+        (keys.ask("main", Ask::Where) + "?name=", "", ErrorCode::BadArgument, "name"),
+        (keys.ask("main", Ask::Where) + "?nmae=gym", "", ErrorCode::BadArgument, "nmae"),
+        (keys.ask("main", Ask::Where) + "?name=gym;robot=r9", "", ErrorCode::NoSuchRobot, "robot"),
+        (keys.ask("main", Ask::Grid) + "?resolution_m=0", "", ErrorCode::BadArgument, "resolution_m"),
+        (keys.command("explode"), "", ErrorCode::Unsupported, "key"),
+        (keys.command("save") + "?map=attic", "", ErrorCode::NoSuchMap, "map"),
+        ("toponym/v1/default/map/main/ask/why".into(), "", ErrorCode::NoSuchQuery, "key"),
+        ("toponym/v1/default/nothing/*".into(), "", ErrorCode::NoSuchQuery, "key"),
+    ];
+    for (selector, payload, code, field) in wrong {
+        let problem = site.ask(&selector, payload).await.unwrap_err();
+        assert_eq!((problem.code, problem.field.as_deref()), (code, Some(field)), "{selector} {payload}");
+        assert!(!problem.message.is_empty());
+    }
+    site.stop().await;
+}
