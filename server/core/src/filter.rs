@@ -85,17 +85,8 @@ impl Filter {
     /// The union of what the particles would look at, one entry per older place, in order.
     fn propose(&self, t: Vertex) -> Vec<Proposal> {
         let followed = |i: Vertex| self.loops.covers(&self.graph, i);
-        let semantic = self.config.semantic_edges && self.config.language;
-        let per_particle: Vec<Vec<Proposal>> = self
-            .particles
-            .par_iter()
-            .map(|p| {
-                let unlabelled = crate::labels::Labels::default();
-                let labels = if semantic { &p.labels } else { &unlabelled };
-                let (seed, gamma) = (self.config.seed, self.config.gamma_per_m2);
-                propose(seed, gamma, &self.graph, &p.smoother, labels, p.count, t, followed)
-            })
-            .collect();
+        let per_particle: Vec<Vec<Proposal>> =
+            self.particles.par_iter().map(|p| propose(&self.config, &self.graph, p, t, followed)).collect();
         let mut union: BTreeMap<Vertex, Proposal> = BTreeMap::new();
         for p in per_particle.into_iter().flatten() {
             let known = union.entry(p.i).or_insert(p);

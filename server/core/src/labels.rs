@@ -78,12 +78,11 @@ impl Labels {
 
     /// Probability that a name applies to each place that has evidence for it.
     pub fn applies(&self, label: LabelId) -> BTreeMap<Vertex, f64> {
-        let mut sums = BTreeMap::new();
+        let mut sums: BTreeMap<Vertex, f64> = BTreeMap::new();
         for e in self.evidence.iter().filter(|e| e.label == label) {
             *sums.entry(e.place).or_insert(0.0) += e.weight;
         }
-        sums.values_mut().for_each(|w| *w = probability(*w));
-        sums
+        sums.into_iter().map(|(v, weight)| (v, probability(weight))).collect()
     }
 
     /// Eqs. (8–9): Σ_l p(l_t = l) p(l_i = l) for every other place i, over the names said (θ
@@ -147,6 +146,7 @@ pub fn probability(weight: f64) -> f64 {
 }
 
 #[cfg(test)]
+#[allow(clippy::float_cmp)]
 mod tests {
     use super::*;
 

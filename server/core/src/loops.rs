@@ -57,6 +57,12 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// A fit that `support` places agree with, a metre apart.
+    #[cfg(test)]
+    pub fn supported_by(i: Vertex, mode: Mode, kind: EdgeKind, support: u32) -> Self {
+        Self { i, mode, kind, origin: kind, support, support_path_m: f64::from(support), age: 0 }
+    }
+
     /// Whether enough places agree for it to count.
     pub fn supported(&self) -> bool {
         self.support >= SUPPORT_MIN && self.support_path_m >= SUPPORT_PATH_M

@@ -4,12 +4,13 @@
 //! pair is matched once. A proposal decides only where we look; whether an edge enters a particle
 //! is decided in [`crate::weigh`], where the proposal's probability is accounted for.
 
+use crate::config::Config;
 use crate::effects::EdgeKind;
 use crate::graph::{Graph, Vertex};
-use crate::labels::Labels;
+use crate::particle::Particle;
 use crate::random::{Purpose, uniform};
 use crate::scan::front::LOCAL_PATH_M;
-use crate::smoothing::{Relative, Smoother};
+use crate::smoothing::Relative;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -23,6 +24,9 @@ const NEAR_M: f64 = 10.0;
 pub const LOST_SIGMA_M: f64 = 10.0;
 /// Probability of an edge to any place looked at, when lost.
 pub const RELOCALISATION_P: f64 = 0.2;
+/// The same for the places just before the break: mostly a robot is where it was.
+const STAYED_P: f64 = 0.9;
+const STAYED_PATH_M: f64 = 3.0;
 /// Similarities below are chance.
 const SIMILARITY_MIN: f64 = 0.02;
 
@@ -64,18 +68,16 @@ pub fn distance(relative: &Relative) -> (f64, f64) {
     (mean_m, along.max(0.0).sqrt())
 }
 
-/// What `count` equal particles would look at from place `t`: distance edges, semantic edges, and any place
+/// What equal particles would look at from place `t`: distance edges, semantic edges, and any place
 /// when it is lost. `followed` says which older places are already being followed.
 pub fn propose(
-    seed: u64,
-    gamma_per_m2: f64,
+    config: &Config,
     graph: &Graph,
-    smoother: &Smoother,
-    labels: &Labels,
-    count: u32,
+    particle: &Particle,
     t: Vertex,
     followed: impl Fn(Vertex) -> bool,
 ) -> Vec<Proposal> {
+    let smoother = &particle.smoother;
     let marginal = smoother.marginal(t);
     let sigma_m = marginal[(0, 0)].max(marginal[(1, 1)]).sqrt();
     // What is being followed needs no second look; words do get one, wherever they point.
@@ -92,18 +94,22 @@ pub fn propose(
         .map(|r| Proposal {
             i: r.i,
             kind: EdgeKind::Distance,
-            probability: distance_probability(r, gamma_per_m2),
+            probability: distance_probability(r, config.gamma_per_m2),
         })
         .collect();
     if lost {
+        let before_break = (0..t).rev().find(|&i| graph.place(i).segment != graph.place(t).segment);
+        let stayed = |i| before_break.is_some_and(|b| !graph.apart(i, b, STAYED_PATH_M));
         proposals.extend(older.map(|i| Proposal {
             i,
             kind: EdgeKind::Relocalisation,
-            probability: RELOCALISATION_P,
+            probability: if stayed(i) { STAYED_P } else { RELOCALISATION_P },
         }));
     }
-    merge_semantic(&mut proposals, labels.similar(t), |i| graph.apart(i, t, LOCAL_PATH_M));
-    draw(seed, graph, t, count, proposals)
+    if config.semantic_edges {
+        merge_semantic(&mut proposals, particle.labels.similar(t), |i| graph.apart(i, t, LOCAL_PATH_M));
+    }
+    draw(config.seed, graph, t, particle.count, proposals)
 }
 
 /// Eqs. (8–9): an edge that the words propose too is a semantic one, of either's probability.
@@ -152,4 +158,41 @@ fn draw(seed: u64, graph: &Graph, t: Vertex, count: u32, proposals: Vec<Proposal
         }
     }
     chosen
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose2;
+    use nalgebra::{Matrix3, Vector3};
+
+    fn relative(x_m: f64, y_m: f64, yaw_rad: f64, sigma: [f64; 2]) -> Relative {
+        let covariance = Matrix3::from_diagonal(&Vector3::new(sigma[0].powi(2), sigma[1].powi(2), 0.01));
+        Relative { i: 0, i_from_a: Pose2::new(x_m, y_m, yaw_rad), covariance }
+    }
+
+    #[test]
+    fn distance_probability_is_the_mean_over_the_folded_gaussian() {
+        // Against a fine sum over d ~ |N(4, 1.5²)|.
+        let r = relative(4.0, 0.0, 0.0, [1.5, 9.0]);
+        let (mut sum, mut mass) = (0.0, 0.0);
+        for k in -6000..=6000 {
+            let s = f64::from(k) * 1e-3;
+            let d: f64 = (4.0 + 1.5 * s).abs();
+            let p = (-0.5 * s * s).exp();
+            sum += p / (1.0 + 0.2 * d * d);
+            mass += p;
+        }
+        assert!((distance_probability(&r, 0.2) - sum / mass).abs() < 2e-3);
+        let sure = relative(0.0, 5.0, 1.0, [1e-9, 1e-9]);
+        assert!((distance_probability(&sure, 0.2) - 1.0 / 6.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn only_the_spread_towards_the_other_place_counts() {
+        // The body looks along the map's y: its x axis points at a place 3 m ahead.
+        let r = relative(0.0, 3.0, std::f64::consts::FRAC_PI_2, [0.7, 5.0]);
+        let (mean_m, sigma_m) = distance(&r);
+        assert!((mean_m - 3.0).abs() < 1e-12 && (sigma_m - 0.7).abs() < 1e-9, "{mean_m} {sigma_m}");
+    }
 }

@@ -94,3 +94,82 @@ fn balance(particles: &mut Vec<Particle>, n: u32) {
         first.count = n - others;
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::EdgeKind;
+    use crate::geometry::Pose2;
+    use crate::particle::Edge;
+    use std::sync::Arc;
+
+    /// Particles with the given weights and counts, each of a graph of its own.
+    fn particles(weights: &[(f64, u32)]) -> Vec<Particle> {
+        let one = |(k, &(weight, count)): (usize, &(f64, u32))| {
+            let edge = Edge {
+                i: k as u32,
+                j: 99,
+                kind: EdgeKind::Distance,
+                i_from_j: Pose2::default(),
+                covariance: nalgebra::Matrix3::identity(),
+            };
+            Particle { edges: Arc::new(vec![edge]), log_weight: f64::ln(weight), count, ..Particle::empty(1) }
+        };
+        weights.iter().enumerate().map(one).collect()
+    }
+
+    fn total(particles: &[Particle]) -> (f64, u32) {
+        (particles.iter().map(Particle::weight).sum(), particles.iter().map(|p| p.count).sum())
+    }
+
+    #[test]
+    fn equal_particles_become_one_with_their_weight_and_count() {
+        let mut all = particles(&[(0.2, 3), (0.5, 4)]);
+        all.extend(particles(&[(0.3, 5)]));
+        let merged = merge(all);
+        assert_eq!(merged.len(), 2);
+        assert!((merged[0].weight() - 0.5).abs() < 1e-12 && (merged[1].weight() - 0.5).abs() < 1e-12);
+        assert_eq!(total(&merged).1, 12);
+    }
+
+    #[test]
+    fn effective_sample_size_counts_particles() {
+        assert!((effective_sample_size(&particles(&[(0.5, 5), (0.5, 5)])) - 10.0).abs() < 1e-9);
+        assert!((effective_sample_size(&particles(&[(1.0, 1), (1e-9, 9)])) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn resampling_keeps_the_heavy_exactly_and_the_light_on_average() {
+        let weights = [(0.6, 5), (0.25, 5), (0.05, 4), (0.04, 3), (0.03, 2), (0.03, 1)];
+        let mut mean = vec![0.0; weights.len()];
+        let runs = 4000;
+        for seed in 0..runs {
+            let kept = resample(particles(&weights), 10, seed, 1);
+            let (weight, count) = total(&kept);
+            assert!((weight - 1.0).abs() < 1e-9);
+            assert_eq!(count, 10);
+            for p in &kept {
+                mean[p.edges[0].i as usize] += p.weight() / runs as f64;
+            }
+        }
+        for (m, (w, _)) in mean.iter().zip(&weights) {
+            assert!((m - w).abs() < 0.01, "{mean:?}");
+        }
+    }
+
+    #[test]
+    fn a_kept_sibling_survives_whatever_its_weight() {
+        let mut all = particles(&[(1.0 - 1e-6, 29), (1e-6, 1)]);
+        all[1].kept_until = 5;
+        assert_eq!(resample(all.clone(), 30, 1, 3).len(), 2);
+        assert_eq!(resample(all, 30, 1, 5).len(), 1);
+    }
+
+    #[test]
+    fn more_graphs_than_particles_are_thinned() {
+        let many: Vec<(f64, u32)> = (0..50).map(|_| (0.02, 1)).collect();
+        let kept = resample(particles(&many), 10, 7, 1);
+        assert_eq!(total(&kept).1, 10);
+        assert!(kept.len() <= 10);
+    }
+}

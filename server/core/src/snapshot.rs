@@ -117,8 +117,8 @@ impl Snapshot {
                     .edges
                     .iter()
                     .map(|e| EdgeView {
-                        i: self.id(e.i),
-                        j: self.id(e.j),
+                        i: PlaceId::from(e.i),
+                        j: PlaceId::from(e.j),
                         kind: e.kind,
                         i_from_j: e.i_from_j,
                     })
@@ -155,14 +155,10 @@ impl Snapshot {
             out.push(LabelCount {
                 label: label.clone(),
                 utterances: utterances.len() as u64,
-                place: self.id(place),
+                place: PlaceId::from(place),
             });
         }
         out
-    }
-
-    fn id(&self, v: Vertex) -> PlaceId {
-        PlaceId::from(v)
     }
 
     /// P(name applies) per place over the whole posterior.
@@ -237,7 +233,7 @@ impl Snapshot {
             .into_iter()
             .filter(|(_, p)| *p >= PROBABILITY_MIN)
             .map(|(v, p_is)| Candidate {
-                place: self.id(v),
+                place: PlaceId::from(v),
                 label: self.ledger.name(label).to_owned(),
                 probability: p_is,
                 p_is,

@@ -34,7 +34,8 @@ const LOG_RATIO_PER_SCORE: f64 = 8.0;
 const SCORE_EVEN: f64 = 0.85;
 /// Posterior probabilities beyond this are certainty.
 const CERTAIN: f64 = 1e-4;
-/// Places' content overlaps along the path: an edge per place uses each scan some three times.
+/// Places' content overlaps along the path: an edge per place uses each scan some three times, so
+/// its information and what it says for or against a particle are a third.
 const SHARED_SCANS: f64 = 3.0;
 /// Cap on what one fit may say for or against a particle.
 const LOG_WEIGHT_STEP_MAX: f64 = 4.0 * LN_10;
@@ -98,7 +99,8 @@ pub struct Choice {
 }
 
 /// Draws e for each of the particle's copies and weighs both outcomes. `relief` is the largest
-/// log-evidence any particle has for this fit: none may lose more than the cap against it.
+/// log-evidence any particle has for this fit: weights are relative to it, and none may lose more
+/// than the cap.
 pub fn choose(
     mut particle: Particle,
     fit: &Fit,
@@ -107,7 +109,7 @@ pub fn choose(
     t: Vertex,
     draw: (u64, u64),
 ) -> Choice {
-    particle.log_weight += judgement.log_evidence.max(relief - LOG_WEIGHT_STEP_MAX);
+    particle.log_weight += ((judgement.log_evidence - relief) / SHARED_SCANS).max(-LOG_WEIGHT_STEP_MAX);
     let p = judgement.posterior;
     let mut taking = if p > 1.0 - CERTAIN {
         particle.count
@@ -173,4 +175,97 @@ fn add_edge(particle: &mut Particle, fit: &Fit, t: Vertex) -> bool {
         covariance,
     });
     true
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose2;
+    use crate::scan::matching::Mode;
+    use nalgebra::Vector3;
+
+    /// A chain of n places 1 m apart, straight on, that has drifted by `sigma_m` per place.
+    fn chain(n: u32, sigma_m: f64) -> Particle {
+        let mut p = Particle::empty(10);
+        let covariance = Matrix3::from_diagonal(&Vector3::new(sigma_m.powi(2), sigma_m.powi(2), 1e-6));
+        let information = covariance.try_inverse().unwrap();
+        for _ in 0..n {
+            p.smoother.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
+        }
+        p
+    }
+
+    fn fit(x_m: f64, score: f64, support: u32) -> Fit {
+        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
+        let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score, overlap: 0.6 };
+        Fit::supported_by(0, mode, EdgeKind::Distance, support)
+    }
+
+    #[test]
+    fn a_fit_where_it_is_expected_is_taken_and_a_far_one_refused() {
+        let p = chain(21, 0.1);
+        let near = judge(&p, &fit(20.3, 0.95, 4), 20, 0.2).unwrap();
+        assert!(near.posterior > 0.99, "{near:?}");
+        let far = judge(&p, &fit(14.0, 0.95, 4), 20, 0.2).unwrap();
+        assert!(far.posterior < 1e-6 && far.distance2 > 100.0, "{far:?}");
+    }
+
+    #[test]
+    fn evidence_is_the_marginal_over_both_outcomes() {
+        let p = chain(21, 0.1);
+        let j = judge(&p, &fit(20.4, 0.9, 3), 20, 0.2).unwrap();
+        // p(z) p(e=0|z) = p(e=0) p(z|e=0).
+        let refused = j.log_evidence + (1.0 - j.posterior).ln();
+        let far = judge(&p, &fit(-40.0, 0.9, 3), 20, 0.2).unwrap();
+        assert!((refused - far.log_evidence).abs() < 1e-6, "{refused} {far:?}");
+    }
+
+    #[test]
+    fn more_support_and_a_better_score_persuade_more() {
+        let p = chain(21, 2.0);
+        let posterior = |score, support| judge(&p, &fit(26.0, score, support), 20, 0.2).unwrap().posterior;
+        assert!(posterior(0.9, 6) > posterior(0.9, 3));
+        assert!(posterior(0.95, 3) > posterior(0.8, 3));
+    }
+
+    #[test]
+    fn both_outcomes_share_the_weight_and_the_copies() {
+        let p = chain(21, 0.1);
+        let judgement = Judgement { log_evidence: -3.0, posterior: 0.7, distance2: 1.0 };
+        let choice = choose(p, &fit(20.0, 0.9, 3), judgement, -3.0, 20, (1, 0));
+        let (taken, refused) = (choice.taken.unwrap(), choice.refused.unwrap());
+        assert_eq!(taken.count + refused.count, 10);
+        assert!((taken.weight() - 0.7).abs() < 1e-12 && (refused.weight() - 0.3).abs() < 1e-12);
+        assert_eq!((taken.edges.len(), refused.edges.len()), (1, 0));
+    }
+
+    #[test]
+    fn adding_an_edge_that_was_predicted_gains_a_particle_nothing_over_its_twin() {
+        // Two equal particles meet the same fit; what one takes must not weigh more than what the
+        // prediction of both already said: their sum is the weight before.
+        let p = chain(21, 0.1);
+        let f = fit(20.0, 0.95, 5);
+        let judgement = judge(&p, &f, 20, 0.2).unwrap();
+        let before = p.weight();
+        let choice = choose(p, &f, judgement, judgement.log_evidence, 20, (1, 0));
+        let after: f64 = [choice.taken, choice.refused].iter().flatten().map(Particle::weight).sum();
+        assert!((after - before).abs() < 1e-12);
+    }
+
+    #[test]
+    fn no_fit_costs_more_than_the_cap() {
+        let judgement = Judgement { log_evidence: -500.0, posterior: 0.0, distance2: 900.0 };
+        let choice = choose(chain(21, 0.1), &fit(14.0, 0.9, 3), judgement, 5.0, 20, (1, 0));
+        assert!((choice.refused.unwrap().log_weight + LOG_WEIGHT_STEP_MAX).abs() < 1e-12);
+    }
+
+    #[test]
+    fn the_refusal_of_a_fresh_semantic_edge_is_kept_for_a_while() {
+        let judgement = Judgement { log_evidence: 0.0, posterior: 0.999, distance2: 1.0 };
+        let mut semantic = fit(20.0, 0.9, 3);
+        semantic.kind = EdgeKind::Semantic;
+        let choice = choose(chain(21, 0.1), &semantic, judgement, 0.0, 20, (1, 0));
+        let refused = choice.refused.unwrap();
+        assert_eq!((refused.count, refused.kept_until), (1, 25));
+    }
 }

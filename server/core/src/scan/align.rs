@@ -116,3 +116,56 @@ fn linearise(source: &[Point], target: &Index, x: &Pose2, gate_m: f32) -> Fit {
         inliers,
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn wall(x0: f32, y0: f32, x1: f32, y1: f32) -> impl Iterator<Item = Point> {
+        let length = (x1 - x0).hypot(y1 - y0);
+        let (nx, ny) = (-(y1 - y0) / length, (x1 - x0) / length);
+        let n = (length / 0.05) as usize;
+        (0..n).map(move |k| {
+            let f = k as f32 / n as f32;
+            Point { x: x0 + f * (x1 - x0), y: y0 + f * (y1 - y0), nx, ny }
+        })
+    }
+
+    fn room() -> Vec<Point> {
+        wall(-3.0, -2.0, 3.0, -2.0)
+            .chain(wall(3.0, -2.0, 3.0, 2.0))
+            .chain(wall(3.0, 2.0, -3.0, 2.0))
+            .collect()
+    }
+
+    #[test]
+    fn finds_the_transform_of_a_room() {
+        let truth = Pose2::new(0.2, -0.15, 0.1);
+        let source: Vec<Point> = room().iter().map(|p| p.moved(&truth.inverse())).collect();
+        let found = align(&source, &Index::new(&room(), 0.6), &Pose2::default(), None, 0.6).unwrap();
+        let off = truth.between(&found.target_from_source);
+        assert!(off.x_m.hypot(off.y_m) < 1e-3 && off.yaw_rad.abs() < 1e-3, "{off:?}");
+        assert!(found.inlier_share > 0.95);
+    }
+
+    #[test]
+    fn a_corridor_says_nothing_along_itself_and_the_prior_decides_there() {
+        let corridor: Vec<Point> = wall(-8.0, -1.0, 8.0, -1.0).chain(wall(8.0, 1.0, -8.0, 1.0)).collect();
+        let source: Vec<Point> = corridor.iter().filter(|p| p.x.abs() < 4.0).copied().collect();
+        let prior = Prior {
+            target_from_source: Pose2::new(0.7, 0.05, 0.02),
+            information: Matrix3::from_diagonal(&Vector3::new(25.0, 25.0, 100.0)),
+        };
+        let index = Index::new(&corridor, 0.6);
+        let found = align(&source, &index, &prior.target_from_source, Some(&prior), 0.6).unwrap();
+        assert!((found.target_from_source.x_m - 0.7).abs() < 0.02, "{found:?}");
+        assert!(found.target_from_source.y_m.abs() < 0.005);
+        assert!(found.information[(0, 0)] < 1e-3 * found.information[(1, 1)]);
+    }
+
+    #[test]
+    fn too_little_is_no_fit() {
+        assert!(align(&room()[..5], &Index::new(&room(), 0.6), &Pose2::default(), None, 0.6).is_none());
+        assert!(align(&room(), &Index::new(&[], 0.6), &Pose2::default(), None, 0.6).is_none());
+    }
+}

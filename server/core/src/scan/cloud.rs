@@ -58,13 +58,8 @@ fn merge_voxel<'a>(points: impl Iterator<Item = &'a Point>, out: &mut Vec<Point>
     // Two sides of a thin wall and the rest.
     let mut sums = [(Point::default(), 0.0f32); 3];
     for p in points {
-        let slot = if !p.has_normal() {
-            2
-        } else if sums[0].1 == 0.0 || sums[0].0.nx * p.nx + sums[0].0.ny * p.ny > 0.0 {
-            0
-        } else {
-            1
-        };
+        let first = sums[0].1 == 0.0 || sums[0].0.nx * p.nx + sums[0].0.ny * p.ny > 0.0;
+        let slot = if p.has_normal() { usize::from(!first) } else { 2 };
         let (sum, n) = &mut sums[slot];
         sum.x += p.x;
         sum.y += p.y;
@@ -162,5 +157,50 @@ impl Index {
             row += 1;
         }
         best
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = Point> {
+        (-9.0f32..9.0, -9.0f32..9.0, -3.1f32..3.1).prop_map(|(x, y, a)| Point {
+            x,
+            y,
+            nx: a.cos(),
+            ny: a.sin(),
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn nearest_is_the_nearest(points in prop::collection::vec(point(), 0..80), p in point(), gate in 0.1f32..1.0) {
+            let index = Index::new(&points, 1.0);
+            let d2 = |q: &Point| (q.x - p.x).powi(2) + (q.y - p.y).powi(2);
+            let brute = points
+                .iter()
+                .filter(|q| d2(q) < gate * gate && q.nx * p.nx + q.ny * p.ny > 0.7)
+                .map(d2)
+                .fold(f32::INFINITY, f32::min);
+            let found = index.nearest(&p, gate).map_or(f32::INFINITY, d2);
+            prop_assert_eq!(found.to_bits(), brute.to_bits());
+        }
+
+        #[test]
+        fn thinning_leaves_a_point_per_voxel_and_side(points in prop::collection::vec(point(), 1..200)) {
+            let thinned = thin(&points, 0.5);
+            prop_assert!(thinned.len() <= points.len());
+            for p in &points {
+                prop_assert!(thinned.iter().any(|q| (q.x - p.x).abs() < 0.51 && (q.y - p.y).abs() < 0.51));
+            }
+        }
+    }
+
+    #[test]
+    fn both_sides_of_a_thin_wall_are_kept() {
+        let side = |x, nx| Point { x, y: 0.01, nx, ny: 0.0 };
+        assert_eq!(thin(&[side(0.01, -1.0), side(0.02, 1.0), side(0.02, -1.0)], 0.1).len(), 2);
     }
 }

@@ -13,7 +13,8 @@ use std::f64::consts::TAU;
 pub const WINDOW_M: f64 = 10.0;
 /// Cell of the target's grid.
 const CELL_M: f64 = 0.125;
-/// Target points farther out are not used.
+/// Half the grid's edge. Target points nearer to the edge than the coarsest block are not used:
+/// a block that begins outside the grid then holds nothing, and its bound is right.
 const RADIUS_M: f64 = 20.0;
 /// The grid's cells on an edge.
 const SIZE: usize = (2.0 * RADIUS_M / CELL_M) as usize;
@@ -40,7 +41,8 @@ impl Pyramid {
     /// Rasterises a cloud; origin in the grid's centre.
     pub fn new(cloud: &[Point]) -> Self {
         let mut base = vec![0u8; SIZE * SIZE];
-        for p in cloud {
+        let used_m = (RADIUS_M - f64::from(1u16 << (LEVELS - 1)) * CELL_M - CELL_M * 2.0) as f32;
+        for p in cloud.iter().filter(|p| p.x.abs() < used_m && p.y.abs() < used_m) {
             stamp(&mut base, f64::from(p.x), f64::from(p.y));
         }
         let mut levels = vec![base];
@@ -114,16 +116,11 @@ pub fn search(target: &Pyramid, source: &[Point], score_min: f64, modes_max: usi
     let mut heap = BinaryHeap::new();
     let (top, half) = ((LEVELS - 1) as u8, (WINDOW_M / CELL_M) as i16);
     let block = 1i16 << top;
-    for heading in 0..HEADINGS {
+    for (heading, points) in rotated.iter().enumerate() {
         for y in (-half..half).step_by(block as usize) {
             for x in (-half..half).step_by(block as usize) {
-                push(
-                    &mut heap,
-                    target,
-                    &rotated[heading],
-                    Node { bound: 0, fineness: 0, heading: heading as u16, x, y },
-                    floor,
-                );
+                let node = Node { bound: 0, fineness: 0, heading: heading as u16, x, y };
+                push(&mut heap, target, points, node, floor);
             }
         }
     }
@@ -209,4 +206,63 @@ fn rotate(source: &[Point], heading: usize) -> Vec<(i16, i16)> {
             (cell(x).clamp(-8000, 8000) as i16, cell(y).clamp(-8000, 8000) as i16)
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// An L of walls with a stub: unlike itself under every turn.
+    fn walls() -> Vec<Point> {
+        let line = |x0: f32, y0: f32, x1: f32, y1: f32| {
+            (0..60).map(move |k| {
+                let f = k as f32 / 60.0;
+                Point { x: x0 + f * (x1 - x0), y: y0 + f * (y1 - y0), nx: 1.0, ny: 0.0 }
+            })
+        };
+        line(-4.0, -3.0, 5.0, -3.0)
+            .chain(line(5.0, -3.0, 5.0, 2.0))
+            .chain(line(1.0, -3.0, 1.0, -1.0))
+            .collect()
+    }
+
+    #[test]
+    fn finds_a_transform_anywhere_in_the_window() {
+        let target = walls();
+        for truth in [Pose2::new(7.3, -6.1, 2.4), Pose2::new(-9.0, 3.3, -0.7), Pose2::new(0.0, 0.0, 3.1)] {
+            let source: Vec<Point> = target.iter().map(|p| p.moved(&truth.inverse())).collect();
+            let found = search(&Pyramid::new(&target), &source, 0.4, 4);
+            let (best, score) = found[0];
+            let off = truth.between(&best);
+            assert!(off.x_m.hypot(off.y_m) < 0.3 && off.yaw_rad.abs() < 0.05, "{truth:?} {best:?}");
+            assert!(score > 0.8, "{score}");
+        }
+    }
+
+    #[test]
+    fn no_bound_is_below_what_it_bounds() {
+        let pyramid = Pyramid::new(&walls());
+        let points = rotate(&walls(), 17);
+        let score = |fineness: u8, x: i16, y: i16| {
+            let mut heap = BinaryHeap::new();
+            push(&mut heap, &pyramid, &points, Node { bound: 0, fineness, heading: 17, x, y }, 0);
+            heap.pop().map_or(0, |n| n.bound)
+        };
+        for (x, y) in [(-32, 0), (0, 0), (16, -48), (40, 24)] {
+            let block = score(2, x, y);
+            let within = (0..8).flat_map(|dx| (0..8).map(move |dy| (dx, dy)));
+            let best = within.map(|(dx, dy)| score(5, x + dx, y + dy)).max().unwrap_or(0);
+            assert!(block >= best, "block at ({x}, {y}): {block} < {best}");
+        }
+    }
+
+    #[test]
+    fn a_straight_wall_has_many_modes_and_an_empty_place_none() {
+        let wall: Vec<Point> =
+            (0..200).map(|k| Point { x: k as f32 * 0.1 - 10.0, y: 1.0, nx: 0.0, ny: -1.0 }).collect();
+        let piece = &wall[70..130];
+        assert!(search(&Pyramid::new(&wall), piece, 0.4, 4).len() == 4);
+        assert!(search(&Pyramid::new(&[]), piece, 0.4, 4).is_empty());
+        assert!(search(&Pyramid::new(&wall), &[], 0.4, 4).is_empty());
+    }
 }

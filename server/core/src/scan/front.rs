@@ -31,8 +31,8 @@ const GATE_M: f32 = 0.6;
 const SHARE_SURE: f64 = 0.6;
 /// Below it the scan says nothing about the pose.
 const SHARE_MIN: f64 = 0.25;
-/// After a break of odometry a scan must fit so well for the track to go on.
-const SHARE_RESUME: f64 = 0.8;
+/// A break of odometry longer than this may hide that the robot was carried off.
+const CARRIED_NS: i64 = 3_000_000_000;
 /// Wheels err with a bias (a scale, a bent axle), and fused at each scan a bias adds up: odometry
 /// decides only where the scans say next to nothing.
 const ODOMETRY_TRUST: f64 = 0.02;
@@ -101,14 +101,18 @@ pub struct Placed {
 pub struct FrontEnd {
     spacing_m: f64,
     next_place: PlaceId,
+    /// Frame of the newest place, open or frozen.
+    newest_place: Pose2,
     front_from_body: Pose2,
     odom_from_body: Option<Pose2>,
+    /// Of the newest scan.
+    stamp_ns: StampNs,
     path_m: f64,
     /// Covariance of the pose in the local map.
     in_map: Matrix3<f64>,
     /// Covariance of the pose relative to the last place.
     since_place: Matrix3<f64>,
-    /// Odometry broke: the next scan decides whether the track goes on.
+    /// Odometry broke: the next scan begins a new local map.
     broken: bool,
     keys: VecDeque<Key>,
     open: VecDeque<OpenPlace>,
@@ -123,8 +127,10 @@ impl FrontEnd {
         Self {
             spacing_m,
             next_place: 0,
+            newest_place: Pose2::default(),
             front_from_body: Pose2::default(),
             odom_from_body: None,
+            stamp_ns: 0,
             path_m: 0.0,
             in_map: Matrix3::zeros(),
             since_place: Matrix3::zeros(),
@@ -159,14 +165,15 @@ impl FrontEnd {
     pub fn scan(&mut self, stamp_ns: StampNs, odom_from_body: Pose2, sweep: Sweep) -> Placed {
         let mut frozen = Vec::new();
         if std::mem::take(&mut self.broken) {
-            if !self.resume(&sweep) {
+            let carried = (stamp_ns - self.stamp_ns).abs() > CARRIED_NS;
+            if carried || !self.resume(&sweep) {
                 frozen = self.start_over();
             }
         } else if let Some(before) = self.odom_from_body {
             self.predict(&before.between(&odom_from_body));
             self.correct(&sweep);
         }
-        self.odom_from_body = Some(odom_from_body);
+        (self.odom_from_body, self.stamp_ns) = (Some(odom_from_body), stamp_ns);
         let began = self.keep_place(stamp_ns);
         self.keep_key(sweep);
         frozen.extend(self.freeze(self.path_m - CONTENT_REACH_M));
@@ -246,7 +253,8 @@ impl FrontEnd {
         best.filter(|b| b.inlier_share >= SHARE_MIN)
     }
 
-    /// After a break: is the robot still where it was?
+    /// After a break too short for the robot to have been carried off: where in the local map is it
+    /// now, whatever its odometry says?
     fn resume(&mut self, sweep: &Sweep) -> bool {
         let points = thin(&sweep.points, VOXEL_M);
         let wide = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
@@ -259,12 +267,14 @@ impl FrontEnd {
                 align(&points, local, &guess, Some(&prior), GATE_M)
             })
             .max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
-        let Some(found) = found.filter(|f| f.inlier_share >= SHARE_RESUME) else { return false };
+        let Some(found) = found.filter(|f| f.inlier_share >= SHARE_SURE) else { return false };
         self.front_from_body = found.target_from_source;
         true
     }
 
-    /// The link to what was is lost: a new local map, and a chain edge that says nothing.
+    /// The link to what was is lost: a new local map, and a chain edge that says next to nothing.
+    /// Whether the robot is still where it was is for the particles to find out: a scan that fits
+    /// the old local map may be a look-alike that it was carried to.
     fn start_over(&mut self) -> Vec<FrozenPlace> {
         let frozen = self.freeze(f64::INFINITY);
         self.keys.clear();
@@ -283,8 +293,8 @@ impl FrontEnd {
         if last.is_some_and(|p| self.path_m - p.path_m < self.spacing_m) {
             return false;
         }
-        let previous_from_this =
-            last.map_or(Pose2::default(), |p| p.front_from_place.between(&self.front_from_body));
+        let previous_from_this = self.newest_place.between(&self.front_from_body);
+        self.newest_place = self.front_from_body;
         let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
         // The local map bends slowly, whatever registration says of one scan.
         let bend = Matrix3::from_diagonal(&Vector3::new(

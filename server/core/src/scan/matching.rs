@@ -2,7 +2,7 @@
 
 use super::agree::agreement;
 use super::align::align;
-use super::cloud::{Index, Point};
+use super::cloud::Index;
 use super::correlate::{self, Pyramid};
 use super::place::{Content, spread};
 use crate::geometry::Pose2;
@@ -47,9 +47,7 @@ impl Target {
 
     /// For the prior-free search too.
     pub fn wide(content: &Content) -> Self {
-        let radius = correlate::WINDOW_M as f32 * 2.0;
-        let near: Vec<Point> = content.cloud.iter().copied().filter(|p| p.x.hypot(p.y) < radius).collect();
-        Self { pyramid: Some(Pyramid::new(&near)), ..Self::near(content) }
+        Self { pyramid: Some(Pyramid::new(&content.cloud)), ..Self::near(content) }
     }
 }
 

@@ -159,7 +159,7 @@ fn normal(hits: &[Hit], k: usize, step_rad: f64) -> (f64, f64) {
         return (0.0, 0.0);
     }
     let (cxx, cxy, cyy) = (sxx - sx * sx / n, sxy - sx * sy / n, syy - sy * sy / n);
-    let (mean, half) = ((cxx + cyy) / 2.0, ((cxx - cyy) / 2.0).hypot(cxy));
+    let (mean, half) = (f64::midpoint(cxx, cyy), ((cxx - cyy) / 2.0).hypot(cxy));
     if mean + half < 1e-8 || ((mean - half).max(0.0) / (mean + half)).sqrt() > NORMAL_FLATNESS_MAX {
         return (0.0, 0.0);
     }
@@ -185,4 +185,85 @@ fn image(hits: &[Hit], laser: &Laser, step_rad: f64) -> RangeImage {
         }
     }
     RangeImage { body_from_laser: laser.body_from_laser, nearest_m, farthest_m }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn laser() -> Laser {
+        Laser {
+            id: "front".into(),
+            body_from_laser: Pose2::new(0.3, 0.1, 0.5),
+            upside_down: false,
+            range_min_m: 0.1,
+            range_max_m: 10.0,
+            ignored_rad: vec![],
+        }
+    }
+
+    fn scan(ranges_m: Vec<f32>) -> Scan {
+        Scan {
+            robot: "r".into(),
+            laser: "front".into(),
+            stamp_ns: 0,
+            angle_min_rad: -1.0,
+            angle_increment_rad: 0.01,
+            time_increment_s: 0.0,
+            ranges_m,
+        }
+    }
+
+    /// A wall 2 m ahead of the laser.
+    fn wall() -> Vec<f32> {
+        (0..200).map(|k| (2.0 / f64::cos(-1.0 + 0.01 * f64::from(k))) as f32).collect()
+    }
+
+    #[test]
+    fn points_lie_on_the_wall_with_normals_towards_the_laser() {
+        let s = sweep(&scan(wall()), &laser(), |_| Pose2::default());
+        for p in &s.points {
+            let q = p.moved(&laser().body_from_laser.inverse());
+            assert!((q.x - 2.0).abs() < 1e-4);
+            assert!(q.nx < -0.99 && q.ny.abs() < 0.1, "{q:?}");
+        }
+        let (near, far) = s.image.at(0.0).unwrap();
+        assert!((near - 2.0).abs() < 0.01 && (far - 2.0).abs() < 0.02);
+        assert!(s.image.at(2.0).is_none(), "behind the laser nothing is known");
+    }
+
+    #[test]
+    fn what_is_no_return_is_no_point() {
+        let mut ranges = wall();
+        ranges[..60]
+            .copy_from_slice(&[[f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.05, -1.0, 10.0]; 10].concat());
+        assert_eq!(sweep(&scan(ranges), &laser(), |_| Pose2::default()).points.len(), 140);
+        let blind = Laser { ignored_rad: vec![(-1.0, -0.5), (3.0, -3.0)], ..laser() };
+        assert_eq!(sweep(&scan(wall()), &blind, |_| Pose2::default()).points.len(), 149);
+    }
+
+    #[test]
+    fn an_inverted_laser_runs_the_other_way() {
+        let mut ranges = wall();
+        ranges.truncate(100); // bearings −1 … 0: to the right, or upside down to the left
+        let inverted = Laser { upside_down: true, body_from_laser: Pose2::default(), ..laser() };
+        let s = sweep(&scan(ranges), &inverted, |_| Pose2::default());
+        assert!(s.points.iter().all(|p| p.y > -0.01 && (p.x - 2.0).abs() < 1e-4));
+    }
+
+    #[test]
+    fn a_swept_scan_is_taken_back_to_its_first_ray() {
+        // The body turns by 1 rad/s while the sweep takes 0.2 s.
+        let at = |dt_s: f64| Pose2::new(0.0, 0.0, dt_s);
+        let mount = Laser { body_from_laser: Pose2::default(), ..laser() };
+        let mut s = scan(vec![]);
+        s.time_increment_s = 1e-3;
+        s.ranges_m = (0..200)
+            .map(|k| (2.0 / f64::cos(-1.0 + 0.01 * f64::from(k) + 1e-3 * f64::from(k))) as f32)
+            .collect();
+        let deskewed = sweep(&s, &mount, at);
+        assert!(deskewed.points.iter().all(|p| (p.x - 2.0).abs() < 1e-3));
+        let skewed = sweep(&s, &mount, |_| Pose2::default());
+        assert!(skewed.points.iter().any(|p| (p.x - 2.0).abs() > 0.1));
+    }
 }
