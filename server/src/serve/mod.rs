@@ -10,7 +10,7 @@
 //! zenoh queries ─► blocking tasks: answers from the Board, never from the filter
 //! ```
 
-mod args;
+pub mod args;
 pub mod board;
 mod intake;
 mod mapping;
