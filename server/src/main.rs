@@ -1,2 +1,49 @@
-//! server
-fn main() {}
+//! Command line of the mapping server.
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+use toponym_server::serve::args::{self, LogFormat, ServeArgs};
+use toponym_server::{demo, map};
+
+/// Maps buildings from robots' scans and people's sentences.
+#[derive(Debug, Parser)]
+#[command(name = "toponym-server", version, arg_required_else_help = true)]
+#[command(after_help = "Start with `toponym-server demo`: it needs no robot and takes half a minute.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    /// How logs are written to stderr
+    #[arg(long, global = true, value_enum, default_value_t)]
+    log_format: LogFormat,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Serve maps over Zenoh
+    Serve(ServeArgs),
+    Map(Box<map::MapArgs>),
+    Demo(demo::DemoArgs),
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let done = match cli.command {
+        Command::Serve(serve) => {
+            args::init_logging(cli.log_format);
+            block_on(args::run(serve))
+        }
+        Command::Map(map) => map::run(&map),
+        Command::Demo(demo) => block_on(demo::run(demo)),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(e) => {
+            eprintln!("error: {e:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn block_on(work: impl Future<Output = anyhow::Result<()>>) -> anyhow::Result<()> {
+    tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(work)
+}

@@ -52,58 +52,79 @@ struct Visit {
 /// What the guide says along a drive, in order of time.
 pub fn narrate(world: &World, drive: &Drive, style: &GuideStyle, draw: &mut Draw) -> Vec<Sentence> {
     let visits = visits(world, drive);
-    // Decided per room before the walk: a room that stays unnamed stays so on every visit.
-    let named: Vec<bool> = world
-        .rooms
-        .iter()
-        .map(|r| {
-            draw.chance(match r.kind {
-                RoomKind::Room => style.named,
-                RoomKind::Corridor => style.corridors,
-            })
-        })
-        .collect();
-    let mut seen = vec![false; world.rooms.len()];
-    let mut announced = vec![false; world.rooms.len()];
+    let mut tour = Tour::new(world, style, draw);
     let mut sentences = Vec::new();
     for (k, visit) in visits.iter().enumerate() {
-        let room = &world.rooms[visit.room];
-        let corridor = room.kind == RoomKind::Corridor;
-        if corridor && let Some(next) = foretold(world, &visits[k..], &seen, &named) {
-            // The landmark is the corridor one stands in.
-            if draw.chance(style.foretold) && !announced[next] {
-                announced[next] = true;
-                let text = format!("The {} is down the {}.", world.rooms[next].name, room.name);
-                sentences.push(spoken(visit.from_s + 1.0, text));
-                continue;
-            }
-        }
-        let first = !seen[visit.room];
-        let worth_a_word = if corridor {
-            first && visit.to_s - visit.from_s >= WALK_S
-        } else {
-            first || draw.chance(style.revisits)
-        };
-        if !named[visit.room] || !worth_a_word {
-            continue;
-        }
-        let namesake =
-            (0..seen.len()).any(|o| o != visit.room && seen[o] && world.rooms[o].name == room.name);
-        seen[visit.room] = true;
-        let pause_s = if corridor { WALK_S / 2.0 } else { 0.5 };
-        let text = phrase(&room.name, first, namesake && !corridor, draw);
-        sentences.push(spoken(visit.from_s + pause_s, text));
+        let sentence = tour.foretell(&visits[k..], draw).or_else(|| tour.name(visit, draw));
+        sentences.extend(sentence);
     }
     sentences.sort_by(|a, b| a.began_s.total_cmp(&b.began_s));
     sentences
 }
 
-/// The next room ahead that gets its name only later.
-fn foretold(world: &World, ahead: &[Visit], seen: &[bool], named: &[bool]) -> Option<usize> {
-    let here = ahead.first()?;
-    let next = ahead.iter().find(|v| world.rooms[v.room].kind == RoomKind::Room)?;
-    let known = (0..seen.len()).any(|o| seen[o] && world.rooms[o].name == world.rooms[next.room].name);
-    (!known && named[next.room] && next.from_s - here.from_s >= 2.0 * WALK_S).then_some(next.room)
+/// What was said so far.
+struct Tour<'a> {
+    world: &'a World,
+    style: &'a GuideStyle,
+    /// Rooms that have a name for this guide. Decided before the walk: one that stays unnamed
+    /// stays so on every visit.
+    named: Vec<bool>,
+    /// Rooms that were named already.
+    told: Vec<bool>,
+    /// Rooms that were foretold already.
+    announced: Vec<bool>,
+}
+
+impl<'a> Tour<'a> {
+    fn new(world: &'a World, style: &'a GuideStyle, draw: &mut Draw) -> Self {
+        let share = |kind| match kind {
+            RoomKind::Room => style.named,
+            RoomKind::Corridor => style.corridors,
+        };
+        let named = world.rooms.iter().map(|r| draw.chance(share(r.kind))).collect();
+        let none = vec![false; world.rooms.len()];
+        Self { world, style, named, told: none.clone(), announced: none }
+    }
+
+    /// Whether a room of that name, other than `except`, was named already.
+    fn is_told(&self, name: &str, except: Option<usize>) -> bool {
+        let rooms = self.world.rooms.iter().zip(&self.told).enumerate();
+        rooms.into_iter().any(|(k, (r, told))| *told && r.name == name && Some(k) != except)
+    }
+
+    /// On entering a corridor that the listener knows by name: what lies down there.
+    fn foretell(&mut self, ahead: &[Visit], draw: &mut Draw) -> Option<Sentence> {
+        let here = ahead.first()?;
+        let corridor = &self.world.rooms[here.room];
+        let next = ahead.iter().find(|v| self.world.rooms[v.room].kind == RoomKind::Room)?;
+        let room = &self.world.rooms[next.room];
+        let new = self.named[next.room] && !self.announced[next.room] && !self.is_told(&room.name, None);
+        let far = next.from_s - here.from_s >= 2.0 * WALK_S;
+        let placed = corridor.kind == RoomKind::Corridor && self.is_told(&corridor.name, None);
+        if !(new && far && placed && draw.chance(self.style.foretold)) {
+            return None;
+        }
+        self.announced[next.room] = true;
+        Some(spoken(here.from_s + 1.0, format!("The {} is down the {}.", room.name, corridor.name)))
+    }
+
+    /// The name of where they are.
+    fn name(&mut self, visit: &Visit, draw: &mut Draw) -> Option<Sentence> {
+        let room = &self.world.rooms[visit.room];
+        let (first, corridor) = (!self.told[visit.room], room.kind == RoomKind::Corridor);
+        let worth_a_word = if corridor {
+            first && visit.to_s - visit.from_s >= WALK_S
+        } else {
+            first || draw.chance(self.style.revisits)
+        };
+        if !self.named[visit.room] || !worth_a_word {
+            return None;
+        }
+        let namesake = !corridor && self.is_told(&room.name, Some(visit.room));
+        self.told[visit.room] = true;
+        let pause_s = if corridor { WALK_S / 2.0 } else { 0.5 };
+        Some(spoken(visit.from_s + pause_s, phrase(&room.name, first, namesake, draw)))
+    }
 }
 
 fn phrase(name: &str, first: bool, namesake: bool, draw: &mut Draw) -> String {
@@ -181,9 +202,9 @@ mod tests {
 
     #[test]
     fn what_lies_ahead_is_foretold_from_the_corridor() {
-        let style = GuideStyle { named: 1.0, revisits: 0.0, foretold: 1.0, corridors: 0.0 };
+        let style = GuideStyle { named: 1.0, revisits: 0.0, foretold: 1.0, corridors: 1.0 };
         let world = demo_building();
-        let tour = ["gym", "cafe"].map(|n| world.room(n).unwrap());
+        let tour = ["elevator lobby", "gym", "cafe"].map(|n| world.room(n).unwrap());
         let drive = drive(&world, &tour, &Motion::default(), &mut Draw::new(1, 0)).unwrap();
         let said = narrate(&world, &drive, &style, &mut Draw::new(1, 1));
         assert!(said.iter().any(|s| s.text == "The cafe is down the hallway."), "{said:?}");

@@ -94,7 +94,7 @@ impl Scenario {
             .collect();
         let mut scenario = Self::new(world, tour, seed);
         scenario.motion.speed_mps = (0.8, 1.0);
-        scenario.guide = GuideStyle { named: 1.0, revisits: 1.0, foretold: 0.25, corridors: 0.0 };
+        scenario.guide = GuideStyle { named: 1.0, revisits: 1.0, foretold: 0.4, corridors: 1.0 };
         scenario
     }
 

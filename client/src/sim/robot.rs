@@ -4,6 +4,7 @@ use super::SimError;
 use super::geom::{Point, between, blend, compose, distance_m, wrap};
 use super::random::Draw;
 use super::world::World;
+use std::f64::consts::FRAC_PI_2;
 use toponym_proto::Pose;
 
 /// Time step of the motion, seconds.
@@ -141,7 +142,9 @@ pub fn drive(world: &World, tour: &[usize], motion: &Motion, draw: &mut Draw) ->
         legs.push(route.ok_or(SimError::NoWay(pair[0], pair[1]))?);
     }
     let ahead = legs.first().and_then(|l| l.get(1)).copied().unwrap_or([start[0] + 1.0, start[1]]);
-    let yaw_rad = (ahead[1] - start[1]).atan2(ahead[0] - start[0]);
+    // Parked square to the walls, as robots are.
+    let towards = (ahead[1] - start[1]).atan2(ahead[0] - start[0]);
+    let yaw_rad = (towards / FRAC_PI_2).round() * FRAC_PI_2;
     let mut body = Body { pose: Pose { x_m: start[0], y_m: start[1], yaw_rad }, speed_mps: 0.0 };
     let mut poses = vec![body.pose];
     body.rest(motion.rest_s, &mut poses);

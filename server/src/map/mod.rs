@@ -1,0 +1,237 @@
+//! `map`: a recorded log through the same core as the server's, as fast as it goes.
+
+mod canvas;
+pub mod image;
+mod play;
+mod progress;
+mod report;
+mod summary;
+mod timing;
+mod trajectory;
+
+pub use canvas::Canvas;
+pub use report::build;
+
+use anyhow::{Context, Result, anyhow, bail};
+use play::Played;
+use progress::Progress;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+use timing::{Stage, Timing};
+use toponym::log::{self, Narration, Notes, Records};
+use toponym_core::query::{GraphAnswer, WhereAnswer};
+use toponym_core::{Answer, Config, Mapper, Pose2, Query};
+
+/// Map a recorded log and answer questions about it.
+#[derive(Clone, Debug, clap::Args)]
+#[command(after_help = "Example:\n  toponym-server map tour.clf.gz --narration tour.jsonl \\\n    \
+    --ask \"where is the kitchen\" --trajectory tour.txt --image tour.png")]
+pub struct MapArgs {
+    /// CARMEN log or a file that `serve --record` wrote, gzipped or not
+    pub log: PathBuf,
+    /// Sentences: one {"t": seconds, "text": "this is the gym"} a line
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub narration: Option<PathBuf>,
+    /// Particles
+    #[arg(long, value_name = "N", conflicts_with = "start_map", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub particles: Option<u32>,
+    /// Seed of every random draw
+    #[arg(long, value_name = "S", conflicts_with = "start_map")]
+    pub seed: Option<u64>,
+    /// Threads; the result does not depend on them [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Do not listen to sentences
+    #[arg(long, conflicts_with = "start_map")]
+    pub no_language: bool,
+    /// Names propose no loop edges
+    #[arg(long, conflicts_with = "start_map")]
+    pub no_semantic_edges: bool,
+    /// Ask the finished map; may be given many times
+    #[arg(long, value_name = "QUESTION")]
+    pub ask: Vec<String>,
+    /// Write `t x y theta` for every odometry line of the log
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// Write places, graphs, answers, sentences and timing
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Write the map, to go on from with --start-map
+    #[arg(long, value_name = "FILE")]
+    pub save_map: Option<PathBuf>,
+    /// Go on from a saved map; its settings come with it
+    #[arg(long, value_name = "FILE")]
+    pub start_map: Option<PathBuf>,
+    /// Draw grid, trajectory, edges and names
+    #[arg(long, value_name = "FILE.png")]
+    pub image: Option<PathBuf>,
+}
+
+impl MapArgs {
+    /// The files to write, by option.
+    fn outputs(&self) -> [(&'static str, Option<&PathBuf>); 4] {
+        [
+            ("--trajectory", self.trajectory.as_ref()),
+            ("--report", self.report.as_ref()),
+            ("--save-map", self.save_map.as_ref()),
+            ("--image", self.image.as_ref()),
+        ]
+    }
+}
+
+/// Runs `map`.
+pub fn run(args: &MapArgs) -> Result<()> {
+    check_outputs(args)?;
+    let log = log::open(&args.log, &log::Options::default())?;
+    let log = match &args.narration {
+        Some(file) => log::merged(log, &Narration::read(file)?),
+        None => log,
+    };
+    let mapper = match &args.start_map {
+        Some(file) => load(file)?,
+        None => Mapper::new(config(args)),
+    };
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(args.threads.unwrap_or(0))
+        .build()
+        .context("--threads: the threads could not be started; give a smaller number")?;
+    let finished = pool.install(|| play(log, mapper, &args.ask))?;
+    finished.notes.warnings().iter().for_each(|w| eprintln!("warning: {w}"));
+    finished.write(args)
+}
+
+fn config(args: &MapArgs) -> Config {
+    let defaults = Config::default();
+    Config {
+        particles: args.particles.unwrap_or(defaults.particles),
+        seed: args.seed.unwrap_or(defaults.seed),
+        language: !args.no_language,
+        semantic_edges: !args.no_semantic_edges,
+        ..defaults
+    }
+}
+
+/// A run may take minutes: a folder that is not there must not be found out afterwards.
+fn check_outputs(args: &MapArgs) -> Result<()> {
+    for (option, file) in args.outputs() {
+        let Some(file) = file else { continue };
+        let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        if !folder.is_dir() {
+            bail!("{option} {}: there is no folder {}; make it first", file.display(), folder.display());
+        }
+        if file.is_dir() {
+            bail!("{option} {}: this is a folder; give a file's name", file.display());
+        }
+    }
+    Ok(())
+}
+
+fn load(file: &Path) -> Result<Mapper> {
+    let bytes = std::fs::read(file).with_context(|| format!("--start-map {}", file.display()))?;
+    Mapper::load(&bytes)
+        .with_context(|| format!("--start-map {}: give a file that --save-map wrote", file.display()))
+}
+
+/// A log that was played to its end.
+struct Finished {
+    played: Played,
+    graph: GraphAnswer,
+    trajectory: Vec<Pose2>,
+    answers: Vec<WhereAnswer>,
+    notes: Notes,
+    robot: String,
+    timing: Timing,
+}
+
+fn play(mut log: Box<dyn Records>, mapper: Mapper, questions: &[String]) -> Result<Finished> {
+    let began = Instant::now();
+    let mut played = Played::new(mapper);
+    let mut progress = Progress::new(log.progress().1);
+    let mut robot = None;
+    while let Some(record) = log.next() {
+        robot = robot.or_else(|| record.message.header().map(|h| h.robot.clone()));
+        let line = record.line;
+        played.feed(record).map_err(|e| anyhow!("{}:{line}: {e}", log.notes().file.display()))?;
+        progress.show(log.progress().0, played.log_s(), &played.mapper);
+    }
+    played.flush();
+    progress.finish();
+    let answers = questions.iter().filter_map(|text| ask(&mut played, text)).collect();
+    let graph = played.mapper.snapshot().graph();
+    let trajectory = played.trajectory(&graph);
+    let wall_s = began.elapsed().as_secs_f64();
+    let spread = |stage| played.stopwatch.spread(stage);
+    let timing = Timing {
+        wall_s,
+        cpu_s: timing::cpu_s(),
+        log_s: played.log_s(),
+        speed: played.log_s() / wall_s,
+        threads: rayon::current_num_threads(),
+        scan: spread(Stage::Scan),
+        place: spread(Stage::Place),
+        utterance: spread(Stage::Utterance),
+        answer: spread(Stage::Answer),
+        peak_mb: timing::peak_mb(),
+    };
+    let (notes, robot) = (log.notes().clone(), robot.unwrap_or_default());
+    Ok(Finished { played, graph, trajectory, answers, notes, robot, timing })
+}
+
+fn ask(played: &mut Played, text: &str) -> Option<WhereAnswer> {
+    let began = Instant::now();
+    let answer = played.mapper.answer(&Query::Where { text: text.into() });
+    played.stopwatch.add(Stage::Answer, began.elapsed());
+    match answer {
+        Answer::Where(answer) => Some(answer),
+        _ => None,
+    }
+}
+
+impl Finished {
+    fn write(self, args: &MapArgs) -> Result<()> {
+        if let Some(file) = &args.trajectory {
+            let text = trajectory::text(&self.played.row_stamps, &self.trajectory);
+            std::fs::write(file, text).with_context(|| format!("--trajectory {}", file.display()))?;
+        }
+        if let Some(file) = &args.save_map {
+            let bytes = self.played.mapper.save().context("--save-map")?;
+            std::fs::write(file, bytes).with_context(|| format!("--save-map {}", file.display()))?;
+        }
+        if let Some(file) = &args.image {
+            draw(&self.played.mapper, &self.trajectory, file)
+                .with_context(|| format!("--image {}", file.display()))?;
+        }
+        print!("{}", summary::text(args, &self));
+        let Some(file) = &args.report else { return Ok(()) };
+        let Self { played, graph, answers, notes, robot, timing, .. } = self;
+        let report = report::report(&played, &graph, answers, &notes, &robot, timing);
+        write_json(&report, file).with_context(|| format!("--report {}", file.display()))
+    }
+}
+
+fn write_json(report: &report::Report, file: &Path) -> Result<()> {
+    let mut out = BufWriter::new(File::create(file)?);
+    serde_json::to_writer_pretty(&mut out, report)?;
+    out.write_all(b"\n")?;
+    Ok(out.flush()?)
+}
+
+/// Draws a mapper's map into a PNG.
+fn draw(mapper: &Mapper, trajectory: &[Pose2], file: &Path) -> Result<()> {
+    let snapshot = mapper.snapshot();
+    let graph = snapshot.graph();
+    let poses = || trajectory.iter().chain(graph.places.iter().map(|p| &p.pose));
+    let span = |f: fn(&Pose2) -> f64| {
+        let (low, high) =
+            poses().map(f).fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)));
+        (high - low).max(0.0)
+    };
+    let extent_m = span(|p| p.x_m).max(span(|p| p.y_m));
+    let query = Query::Grid { resolution_m: image::resolution_m(extent_m) };
+    let Answer::Grid(grid) = snapshot.answer(&query) else { bail!("the map has no grid to draw") };
+    let mut out = BufWriter::new(File::create(file)?);
+    image::draw(&grid, &graph, trajectory).write_png(&mut out)?;
+    Ok(out.flush()?)
+}

@@ -1,0 +1,114 @@
+//! What `map` tells people when it is done.
+
+use super::{Finished, MapArgs, trajectory};
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use toponym_core::effects::{EdgeKind, HeardStatus};
+use toponym_core::query::WhereAnswer;
+
+/// A handful of lines.
+pub fn text(args: &MapArgs, done: &Finished) -> String {
+    let mut text = String::new();
+    let mut line = |what: &str, content: String| {
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{what:<10} {content}");
+    };
+    let (played, timing, notes) = (&done.played, &done.timing, &done.notes);
+    line(
+        "log",
+        format!(
+            "{}: {:.0} s, {} scans, {} odometry rows",
+            args.log.display(),
+            timing.log_s,
+            notes.scans,
+            played.row_stamps.len()
+        ),
+    );
+    for (reason, count) in &played.scans_dropped {
+        line("dropped", format!("{count} scans: {reason}"));
+    }
+    line("map", map(done));
+    if !played.heard.is_empty() {
+        let understood = played.heard.iter().filter(|h| h.status == HeardStatus::Understood).count();
+        line("sentences", format!("{understood} of {} understood", played.heard.len()));
+    }
+    let memory = timing.peak_mb.map_or(String::new(), |mb| format!(", {mb:.0} MB"));
+    line(
+        "time",
+        format!(
+            "{:.1} s on {} threads, {:.1}× the log's own{memory}",
+            timing.wall_s, timing.threads, timing.speed
+        ),
+    );
+    for answer in &done.answers {
+        let _ = write!(text, "{}", told(answer));
+    }
+    for (option, file) in args.outputs() {
+        if let Some(file) = file {
+            let _ = writeln!(text, "{:<10} {}", option.trim_start_matches("--"), file.display());
+        }
+    }
+    text
+}
+
+fn map(done: &Finished) -> String {
+    let best = done.graph.particles.first();
+    let mut kinds: BTreeMap<EdgeKind, usize> = BTreeMap::new();
+    for edge in best.iter().flat_map(|p| &p.edges) {
+        *kinds.entry(edge.kind).or_default() += 1;
+    }
+    let count = |kind| kinds.get(&kind).copied().unwrap_or(0);
+    format!(
+        "{} places on {:.0} m; loop edges: {} distance, {} semantic, {} relocalisation; \
+         best of {} graphs, weight {:.2}",
+        done.graph.places.len(),
+        trajectory::path_m(&done.trajectory),
+        count(EdgeKind::Distance),
+        count(EdgeKind::Semantic),
+        count(EdgeKind::Relocalisation),
+        done.graph.particles.len(),
+        best.map_or(0.0, |p| p.weight),
+    )
+}
+
+/// A question and its answer, a line per candidate.
+pub fn told(answer: &WhereAnswer) -> String {
+    const SHOWN: usize = 3;
+    let mut text = format!("{}\n", answer.text);
+    for c in answer.candidates.iter().take(SHOWN) {
+        let _ = writeln!(
+            text,
+            "  {:>3.0} %  {} at ({:.1} m, {:.1} m)",
+            100.0 * c.probability,
+            c.label,
+            c.pose.x_m,
+            c.pose.y_m
+        );
+    }
+    let more = answer.candidates.len().saturating_sub(SHOWN);
+    if more > 0 {
+        let _ = writeln!(text, "         and {more} more");
+    }
+    if answer.p_none >= 0.005 || answer.candidates.is_empty() {
+        let _ = writeln!(text, "  {:>3.0} %  nowhere in this map", 100.0 * answer.p_none);
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn not_known_is_told_too() {
+        let answer = WhereAnswer {
+            text: "where is the pool".into(),
+            label: Some("pool".into()),
+            via: "unknown".into(),
+            p_none: 1.0,
+            candidates: vec![],
+            robot: None,
+        };
+        assert_eq!(told(&answer), "where is the pool\n  100 %  nowhere in this map\n");
+    }
+}
