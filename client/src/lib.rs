@@ -28,6 +28,9 @@ pub mod robot;
 pub mod session;
 pub mod sim;
 
+#[cfg(test)]
+mod network_tests;
+
 pub use guide::Guide;
 pub use planner::Planner;
 pub use replay::Replay;

@@ -21,8 +21,6 @@ use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, Mis
 
 /// Lets a server notice that the last message is missing.
 const HEARTBEAT: Duration = Duration::from_millis(500);
-/// A watermark that stands still so long means that something got lost; doubles each time.
-const RESEND_AFTER: Duration = Duration::from_secs(2);
 /// How long the server may take to tell its watermark when asked.
 const ASK_WAIT: Duration = Duration::from_secs(1);
 
@@ -51,6 +49,9 @@ pub struct RobotConfig {
     pub form: Form,
     /// Messages kept until they are acknowledged; sending waits while there are so many.
     pub in_flight_max: usize,
+    /// A watermark that stands still so long means that something got lost: what is above it is
+    /// sent again, the next time after twice as long.
+    pub resend_after: Duration,
     /// How long the watermark may stand still before sending fails.
     pub patience: Duration,
 }
@@ -66,6 +67,7 @@ impl RobotConfig {
             clock: Clock::Unix,
             form: Form::Bincode,
             in_flight_max: 4096,
+            resend_after: Duration::from_secs(2),
             patience: Duration::from_secs(60),
         }
     }
@@ -105,6 +107,7 @@ impl Robot {
         let keys = Keys::new(&config.site)?;
         let (acks, on_ack) = latest(session, keys.ack(&config.robot)).await?;
         let (states, on_state) = latest(session, keys.state(&config.robot)).await?;
+        let resend_after = config.resend_after;
         Ok(Self {
             session: session.clone(),
             config,
@@ -113,7 +116,7 @@ impl Robot {
             publishers: BTreeMap::new(),
             unacked: VecDeque::new(),
             moved: Instant::now(),
-            resend_after: RESEND_AFTER,
+            resend_after,
             acks,
             states,
             _subscribers: [on_ack, on_state],
@@ -246,13 +249,15 @@ impl Robot {
     }
 
     fn drop_acked(&mut self) {
-        let Some(ack) = self.acked() else { return };
-        let before = self.unacked.len();
-        while self.unacked.front().is_some_and(|m| m.seq <= ack.seq) {
-            self.unacked.pop_front();
+        if let Some(ack) = self.acked() {
+            self.drop_until(ack.seq);
         }
-        if self.unacked.len() < before {
-            (self.moved, self.resend_after) = (Instant::now(), RESEND_AFTER);
+    }
+
+    fn drop_until(&mut self, seq: u64) {
+        while self.unacked.front().is_some_and(|m| m.seq <= seq) {
+            self.unacked.pop_front();
+            (self.moved, self.resend_after) = (Instant::now(), self.config.resend_after);
         }
     }
 
@@ -280,18 +285,15 @@ impl Robot {
         }
         if self.moved.elapsed() >= self.config.patience {
             let what = format!("acknowledgement of {} messages", self.unacked.len());
+            // Who tries again after all gets the same patience again.
+            (self.moved, self.resend_after) = (Instant::now(), self.config.resend_after);
             return Err(ClientError::Timeout { what, after: self.config.patience });
         }
         self.resend_after *= 2;
         let asked: Result<Ack, _> =
             ask(&self.session, &self.keys.ack(&self.config.robot), "", ASK_WAIT).await;
         match asked {
-            Ok(ack) if ack.boot == self.config.boot => {
-                while self.unacked.front().is_some_and(|m| m.seq <= ack.seq) {
-                    self.unacked.pop_front();
-                    (self.moved, self.resend_after) = (Instant::now(), RESEND_AFTER);
-                }
-            }
+            Ok(ack) if ack.boot == self.config.boot => self.drop_until(ack.seq),
             Ok(_) => {}
             Err(e) => warn!("the watermark is not known: {e}"),
         }

@@ -4,7 +4,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::time::Duration;
 use thiserror::Error;
-use tokio::time::{Instant, sleep, timeout_at};
+use tokio::time::{Instant, sleep_until, timeout_at};
 use toponym_proto::Invalid;
 use toponym_proto::answer::{ErrorCode, ErrorReply, Problem};
 use toponym_proto::keys::DEFAULT_ENDPOINT;
@@ -89,11 +89,14 @@ pub async fn open(endpoint: &str) -> Result<Session, ClientError> {
     ];
     let mut config = zenoh::Config::default();
     for (key, value) in settings {
-        config.insert_json5(key, &value.to_string())?;
+        config.insert_json5(key, &value.to_string()).map_err(|_| {
+            Invalid::new("connect", format!("{endpoint:?} is no endpoint such as {DEFAULT_ENDPOINT}"))
+        })?;
     }
-    zenoh::open(config).await.map_err(|e| ClientError::NoServer {
+    // Zenoh's text says no more than this, and where in its source it says it.
+    zenoh::open(config).await.map_err(|_| ClientError::NoServer {
         endpoint: endpoint.into(),
-        why: format!("{e}; start one with `toponym-server serve`, or name another with --connect"),
+        why: "nobody answers; start one with `toponym-server serve`, or name another with --connect".into(),
     })
 }
 
@@ -104,36 +107,33 @@ pub(crate) async fn ask<T: DeserializeOwned>(
     arguments: &str,
     timeout: Duration,
 ) -> Result<T, ClientError> {
-    let (start, late) = (Instant::now(), || ClientError::Timeout { what: key.into(), after: timeout });
+    let late = || ClientError::Timeout { what: key.into(), after: timeout };
+    let nobody = || ClientError::NoServer {
+        endpoint: key.into(),
+        why: "connected, but nobody answers there; is --site right?".into(),
+    };
+    let (start, mut silent) = (Instant::now(), false);
     let deadline = start + timeout;
     let selector = if arguments.is_empty() { key.to_owned() } else { format!("{key}?{arguments}") };
     loop {
         let left = deadline.saturating_duration_since(Instant::now());
-        if left.is_zero() {
-            return Err(late());
-        }
         let replies = session.get(&selector).timeout(left).consolidation(ConsolidationMode::None).await?;
-        let reply = timeout_at(deadline, replies.recv_async()).await.map_err(|_| late())?;
-        match reply.ok().map(zenoh::query::Reply::into_result) {
+        let Ok(reply) = timeout_at(deadline, replies.recv_async()).await else {
+            return Err(if silent { nobody() } else { late() });
+        };
+        silent = reply.is_err();
+        let again_until = match reply.ok().map(zenoh::query::Reply::into_result) {
             Some(Ok(sample)) => return read(key, &sample.payload().to_bytes()),
-            Some(Err(error)) => {
-                let bytes = error.payload().to_bytes();
-                match serde_json::from_slice::<ErrorReply>(&bytes) {
-                    Ok(ErrorReply { error }) if error.code == ErrorCode::Busy => {}
-                    Ok(ErrorReply { error }) => return Err(ClientError::Refused(error)),
-                    // Zenoh's own error, of which there is one: the query's time is over.
-                    Err(_) => return Err(late()),
-                }
-            }
-            None if start.elapsed() >= NOBODY_WAIT.min(timeout) => {
-                return Err(ClientError::NoServer {
-                    endpoint: key.into(),
-                    why: "connected, but nobody answers there; is --site right?".into(),
-                });
-            }
-            None => {}
-        }
-        sleep(AGAIN).await;
+            Some(Err(error)) => match serde_json::from_slice::<ErrorReply>(&error.payload().to_bytes()) {
+                Ok(ErrorReply { error }) if error.code == ErrorCode::Busy => deadline,
+                Ok(ErrorReply { error }) => return Err(ClientError::Refused(error)),
+                // Zenoh's own error, of which there is one: the query's time is over.
+                Err(_) => return Err(late()),
+            },
+            None if start.elapsed() >= NOBODY_WAIT.min(timeout) => return Err(nobody()),
+            None => start + NOBODY_WAIT.min(timeout),
+        };
+        sleep_until(again_until.min(Instant::now() + AGAIN)).await;
     }
 }
 

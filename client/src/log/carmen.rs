@@ -235,8 +235,8 @@ mod tests {
             let line = format!("{head} {remissions} 1 2 0.5 0.8 2 0.5 0.1 0.2 1 1 0 42.5 robot 43");
             let s = scan(&line);
             assert_eq!((s.angle_min_rad, s.angle_increment_rad, s.range_max_m), (-2.0, 0.1, Some(5.6)));
-            assert_eq!(s.odom_from_laser.x_m, 1.0);
-            assert_eq!(s.odom_from_body.x_m, 0.8);
+            assert_eq!(s.odom_from_laser, Pose { x_m: 1.0, y_m: 2.0, yaw_rad: 0.5 });
+            assert_eq!(s.odom_from_body, Pose { x_m: 0.8, y_m: 2.0, yaw_rad: 0.5 });
             assert_eq!(s.stamp, "42.5");
         }
     }

@@ -39,10 +39,10 @@ impl CarmenLog {
     /// # Errors
     /// If there is no usable scan.
     pub fn new(text: Vec<u8>, options: &Options, notes: Notes) -> Result<Self, LogError> {
-        let survey = Survey::of(&text).map_err(|(lines, why)| LogError::NoScan {
-            file: notes.file.clone(),
-            lines,
-            detail: notes.remarks.iter().cloned().chain(why).map(|w| format!("; {w}")).collect(),
+        let survey = Survey::of(&text).map_err(|(lines, why)| {
+            let whys: Vec<String> = notes.remarks.iter().cloned().chain(why).collect();
+            let detail = if whys.is_empty() { String::new() } else { format!("; {}", whys.join("; ")) };
+            LogError::NoScan { file: notes.file.clone(), lines, detail }
         })?;
         let mut log = Self {
             text,
@@ -248,7 +248,8 @@ fn mounting(first: &ScanLine<'_>, last: &ScanLine<'_>) -> Pose {
 fn between(a: &Pose, b: &Pose) -> Pose {
     let (s, c) = a.yaw_rad.sin_cos();
     let (dx, dy) = (b.x_m - a.x_m, b.y_m - a.y_m);
-    Pose { x_m: c * dx + s * dy, y_m: -s * dx + c * dy, yaw_rad: wrap(b.yaw_rad - a.yaw_rad) }
+    // Adding zero turns −0 into 0.
+    Pose { x_m: c * dx + s * dy + 0.0, y_m: -s * dx + c * dy + 0.0, yaw_rad: wrap(b.yaw_rad - a.yaw_rad) }
 }
 
 fn wrap(angle_rad: f64) -> f64 {

@@ -15,6 +15,10 @@ fn setup_laser(text: &str) -> Laser {
     setup.lasers[0].clone()
 }
 
+fn ahead(x_m: f64) -> Pose {
+    Pose { x_m, ..Pose::default() }
+}
+
 fn kinds(records: &[LogRecord]) -> String {
     records
         .iter()
@@ -66,18 +70,19 @@ fn max_range_means_nothing_seen() {
     let (records, _) = read(SCAN_AT_1);
     let Message::Scan(scan) = &records[2].message else { panic!("{records:?}") };
     assert_eq!(scan.ranges_m, [1.0, f32::INFINITY]);
-    assert_eq!(setup_laser(SCAN_AT_1).range_max_m, 80.0);
+    assert_eq!(setup_laser(SCAN_AT_1), laser(ahead(0.3), 80.0));
 
     let short = format!("PARAM robot_front_laser_max 0.9\n{SCAN_AT_1}").replace("0.9", "1.0");
-    assert_eq!(setup_laser(&short).range_max_m, 1.0);
+    assert_eq!(setup_laser(&short), laser(ahead(0.3), 1.0));
     let Message::Scan(scan) = &read(&short).0[2].message else { panic!("no scan") };
     assert_eq!(scan.ranges_m, [f32::INFINITY; 2]);
 }
 
 #[test]
 fn mounting_comes_from_the_parameter_or_from_the_scans_two_poses() {
-    assert_eq!(setup_laser(&format!("PARAM robot_frontlaser_offset 0.27 1 h 1\n{SCAN_AT_1}")).x_m, 0.27);
-    assert_eq!(setup_laser(SCAN_AT_1).x_m, 0.3);
+    let parameter = format!("PARAM robot_frontlaser_offset 0.27 1 h 1\n{SCAN_AT_1}");
+    assert_eq!(setup_laser(&parameter), laser(ahead(0.27), 80.0));
+    assert_eq!(setup_laser(SCAN_AT_1), laser(ahead(0.3), 80.0));
     // Facing +y the same offset lies along y.
     let turned = "FLASER 1 1 2 3.3 1.570796 2 3 1.570796 1 h 1\n";
     let laser = setup_laser(turned);
@@ -87,8 +92,8 @@ fn mounting_comes_from_the_parameter_or_from_the_scans_two_poses() {
 #[test]
 fn poses_of_a_corrected_log_are_no_mounting() {
     let corrected = format!("{SCAN_AT_1}FLASER 1 1 0.9 0.4 0.1 0 0 0 2 h 2\n");
-    assert_eq!(setup_laser(&corrected).x_m, 0.0);
-    assert_eq!(setup_laser("FLASER 1 1 50 0 0 0 0 0 2 h 2\n").x_m, 0.0);
+    assert_eq!(setup_laser(&corrected), laser(ahead(0.0), 80.0));
+    assert_eq!(setup_laser("FLASER 1 1 50 0 0 0 0 0 2 h 2\n"), laser(ahead(0.0), 80.0));
 }
 
 #[test]
