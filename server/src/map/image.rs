@@ -7,7 +7,7 @@ use embedded_graphics::primitives::Rectangle;
 use std::collections::BTreeMap;
 use toponym_core::Pose2;
 use toponym_core::effects::{EdgeKind, PlaceId};
-use toponym_core::query::{GraphAnswer, Grid, PlaceView};
+use toponym_core::query::{EdgeView, GraphAnswer, Grid, PlaceView};
 
 /// Longest side of the map's part of the picture, pixels.
 const SIDE_MAX: usize = 1800;
@@ -21,6 +21,10 @@ const LEGEND: i32 = 92;
 const WIDTH_MIN: i32 = 640;
 /// Names within this distance of each other are written once.
 const NAME_SPACING_M: f64 = 8.0;
+/// Share of the known cells that may fall outside the picture on each side.
+const STRAY: f64 = 0.001;
+/// Above so many edges each is drawn thin.
+const EDGES_THICK_MAX: usize = 150;
 /// A place is taken to be called so from this probability on.
 const NAME_P_MIN: f64 = 0.3;
 
@@ -47,23 +51,29 @@ pub fn resolution_m(extent_m: f64) -> f64 {
 /// Draws a map. `trajectory` in order of time, map frame.
 pub fn draw(grid: &Grid, graph: &GraphAnswer, trajectory: &[Pose2]) -> Canvas {
     let view = View::of(grid, graph, trajectory);
-    let (width, height) = view.size();
-    let mut canvas = Canvas::new(Size::new(width as u32, (height + LEGEND) as u32), Rgb888::WHITE);
+    let (full_width, height) = view.size();
+    let mut canvas = Canvas::new(Size::new(full_width as u32, (height + LEGEND) as u32), Rgb888::WHITE);
     view.draw_grid(grid, &mut canvas, height);
     for pair in trajectory.windows(2) {
         canvas.line(view.pixel(&pair[0]), view.pixel(&pair[1]), TRAJECTORY, 1);
     }
     let places: BTreeMap<PlaceId, &PlaceView> = graph.places.iter().map(|p| (p.id, p)).collect();
-    for edge in graph.particles.first().iter().flat_map(|best| &best.edges) {
+    let mut edges: Vec<&EdgeView> = graph.particles.first().iter().flat_map(|best| &best.edges).collect();
+    let width = if edges.len() > EDGES_THICK_MAX { 1 } else { 2 };
+    // The rare kinds last, above the others.
+    edges.sort_by_key(|e| e.kind);
+    for edge in edges {
+        let thicker = u32::from(edge.kind != EdgeKind::Distance);
         if let (Some(i), Some(j)) = (places.get(&edge.i), places.get(&edge.j)) {
-            canvas.line(view.pixel(&i.pose), view.pixel(&j.pose), kind_style(edge.kind).0, 2);
+            let (a, b) = (view.pixel(&i.pose), view.pixel(&j.pose));
+            canvas.line(a, b, kind_style(edge.kind).0, width + thicker);
         }
     }
     for place in &graph.places {
         canvas.disc(view.pixel(&place.pose), 5, PLACE);
     }
     write_names(&view, graph, &mut canvas, height);
-    legend(&view, graph, &mut canvas, width, height);
+    legend(&view, graph, &mut canvas, full_width, height);
     canvas
 }
 
@@ -78,17 +88,15 @@ struct View {
 }
 
 impl View {
-    /// All that is known of the grid, every pose and every place.
+    /// Nearly all that is known of the grid, every pose and every place.
     fn of(grid: &Grid, graph: &GraphAnswer, trajectory: &[Pose2]) -> Self {
         let grid_from_map = grid.map_from_grid.inverse();
         let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
         let mut show = |x: f64, y: f64| {
             (low, high) = ([low[0].min(x), low[1].min(y)], [high[0].max(x), high[1].max(y)]);
         };
-        for (k, _) in grid.cells.iter().enumerate().filter(|(_, c)| **c >= 0) {
-            let (x, y) = ((k % grid.width) as f64, (k / grid.width) as f64);
-            show(x * grid.resolution_m, y * grid.resolution_m);
-            show((x + 1.0) * grid.resolution_m, (y + 1.0) * grid.resolution_m);
+        for end in grid_bounds(grid) {
+            show(end[0], end[1]);
         }
         for pose in trajectory.iter().chain(graph.places.iter().map(|p| &p.pose)) {
             let (x, y) = grid_from_map.apply(pose.x_m, pose.y_m);
@@ -142,6 +150,27 @@ impl View {
             canvas.fill(Rectangle::new(top_left, size), Rgb888::new(light as u8, light as u8, light as u8));
         }
     }
+}
+
+/// Opposite corners of what is known of a grid, grid axes, metres. A stray beam through a window
+/// would shrink all the rest: the outermost [`STRAY`] of the cells on each side may fall outside.
+fn grid_bounds(grid: &Grid) -> Vec<[f64; 2]> {
+    let known = || grid.cells.iter().enumerate().filter(|(_, cell)| **cell >= 0).map(|(k, _)| k);
+    let bounds = |count: usize, line: &dyn Fn(usize) -> usize| {
+        let mut cells = vec![0_usize; count];
+        known().for_each(|k| cells[line(k)] += 1);
+        let stray = (STRAY * cells.iter().sum::<usize>() as f64) as usize;
+        let seen = |left: &mut usize, n: &usize| {
+            *left += n;
+            Some(*left)
+        };
+        let first = cells.iter().scan(0, seen).position(|sum| sum > stray)?;
+        let last = count - cells.iter().rev().scan(0, seen).position(|sum| sum > stray)?;
+        Some([first as f64 * grid.resolution_m, last as f64 * grid.resolution_m])
+    };
+    let columns = bounds(grid.width, &|k| k % grid.width);
+    let rows = bounds(grid.height, &|k| k / grid.width);
+    columns.zip(rows).map_or(Vec::new(), |(x, y)| vec![[x[0], y[0]], [x[1], y[1]]])
 }
 
 /// Where each name is written: by the best place of each cluster that bears it, best first.
@@ -229,7 +258,7 @@ fn scale_bar_m(pixels_per_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toponym_core::query::{EdgeView, ParticleView};
+    use toponym_core::query::ParticleView;
 
     fn place(id: PlaceId, x: f64, y: f64, labels: &[(&str, f64)]) -> PlaceView {
         let labels = labels.iter().map(|(n, p)| ((*n).to_string(), *p)).collect();
@@ -270,6 +299,18 @@ mod tests {
         assert_eq!(at(5.0, 2.95), Rgb888::new(20, 20, 20), "wall");
         assert_eq!(at(5.0, 0.0), Rgb888::WHITE, "free");
         assert_eq!(canvas.pixel(Point::new(2, 2)), Some(UNKNOWN));
+    }
+
+    #[test]
+    fn a_stray_beam_does_not_shrink_the_map() {
+        let mut cells = vec![-1; 400 * 40];
+        for row in 0..40 {
+            cells[row * 400..row * 400 + 100].fill(0);
+        }
+        cells[20 * 400 + 399] = 100;
+        let stray = Grid { width: 400, cells, ..grid() };
+        assert_eq!(grid_bounds(&stray), [[0.0, 0.0], [10.0, 4.0]]);
+        assert_eq!(draw(&stray, &graph(), &[]).size(), draw(&grid(), &graph(), &[]).size());
     }
 
     #[test]
