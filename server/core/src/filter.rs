@@ -17,6 +17,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+/// An edge says that two places are one only if they lie this near; scans tie farther ones too.
+const SAME_PLACE_M: f64 = 3.0;
+
 /// The posterior over semantic graphs, and what all particles share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Filter {
@@ -112,7 +115,8 @@ impl Filter {
                 None => (None, Some(p)),
                 Some(j) => {
                     let mut choice = choose(p, fit, *j, relief, t, (seed, k as u64));
-                    if let Some(taken) = &mut choice.taken {
+                    let apart_m = fit.mode.i_from_j.x_m.hypot(fit.mode.i_from_j.y_m);
+                    if let Some(taken) = choice.taken.as_mut().filter(|_| apart_m < SAME_PLACE_M) {
                         taken.labels.carry_over(fit.i, t);
                     }
                     (choice.taken, choice.refused)

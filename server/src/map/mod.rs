@@ -97,7 +97,7 @@ pub fn run(args: &MapArgs) -> Result<()> {
         .num_threads(args.threads.unwrap_or(0))
         .build()
         .context("--threads: the threads could not be started; give a smaller number")?;
-    let finished = pool.install(|| play(log, mapper, &args.ask))?;
+    let finished = pool.install(|| play(log, mapper, args))?;
     finished.notes.warnings().iter().for_each(|w| eprintln!("warning: {w}"));
     finished.write(args)
 }
@@ -137,6 +137,8 @@ fn load(file: &Path) -> Result<Mapper> {
 /// A log that was played to its end.
 struct Finished {
     played: Played,
+    /// The map as it was when the log ended, for --save-map.
+    saved: Option<Vec<u8>>,
     graph: GraphAnswer,
     trajectory: Vec<Pose2>,
     answers: Vec<WhereAnswer>,
@@ -145,7 +147,7 @@ struct Finished {
     timing: Timing,
 }
 
-fn play(mut log: Box<dyn Records>, mapper: Mapper, questions: &[String]) -> Result<Finished> {
+fn play(mut log: Box<dyn Records>, mapper: Mapper, args: &MapArgs) -> Result<Finished> {
     let began = Instant::now();
     let mut played = Played::new(mapper);
     let mut progress = Progress::new(log.progress().1);
@@ -156,9 +158,11 @@ fn play(mut log: Box<dyn Records>, mapper: Mapper, questions: &[String]) -> Resu
         played.feed(record).map_err(|e| anyhow!("{}:{line}: {e}", log.notes().file.display()))?;
         progress.show(log.progress().0, played.log_s(), &played.mapper);
     }
+    // Saved before the flush: what goes on from it equals a run without a pause.
+    let saved = args.save_map.as_ref().map(|_| played.mapper.save()).transpose().context("--save-map")?;
     played.flush();
     progress.finish();
-    let answers = questions.iter().filter_map(|text| ask(&mut played, text)).collect();
+    let answers = args.ask.iter().filter_map(|text| ask(&mut played, text)).collect();
     let graph = played.mapper.snapshot().graph();
     let trajectory = played.trajectory(&graph);
     let wall_s = began.elapsed().as_secs_f64();
@@ -176,7 +180,7 @@ fn play(mut log: Box<dyn Records>, mapper: Mapper, questions: &[String]) -> Resu
         peak_mb: timing::peak_mb(),
     };
     let (notes, robot) = (log.notes().clone(), robot.unwrap_or_default());
-    Ok(Finished { played, graph, trajectory, answers, notes, robot, timing })
+    Ok(Finished { played, saved, graph, trajectory, answers, notes, robot, timing })
 }
 
 fn ask(played: &mut Played, text: &str) -> Option<WhereAnswer> {
@@ -195,8 +199,7 @@ impl Finished {
             let text = trajectory::text(&self.played.row_stamps, &self.trajectory);
             std::fs::write(file, text).with_context(|| format!("--trajectory {}", file.display()))?;
         }
-        if let Some(file) = &args.save_map {
-            let bytes = self.played.mapper.save().context("--save-map")?;
+        if let (Some(file), Some(bytes)) = (&args.save_map, &self.saved) {
             std::fs::write(file, bytes).with_context(|| format!("--save-map {}", file.display()))?;
         }
         if let Some(file) = &args.image {
@@ -338,6 +341,28 @@ mod tests {
         assert!(folder.error(&["--start-map", "@m.bin", "--seed", "3"]).contains("--start-map"));
         assert!(folder.error(&["--start-map", "@sim.clf"]).contains("give a file that --save-map wrote"));
         assert!(folder.error(&["--start-map", "@none"]).contains("--start-map"));
+    }
+
+    #[test]
+    fn two_halves_are_the_whole() {
+        let folder = Folder::new("halves");
+        // No sentences: those of one half would be out of place in the other.
+        std::fs::write(folder.0.join("narration.jsonl"), "").unwrap();
+        folder.map(&["--report", "@whole.json"]).unwrap();
+        let log = std::fs::read_to_string(folder.0.join("sim.clf")).unwrap();
+        let head: Vec<&str> = log.lines().filter(|l| l.starts_with(['#', 'P'])).collect();
+        let body: Vec<&str> = log.lines().filter(|l| !l.starts_with(['#', 'P'])).collect();
+        let write = |name: &str, part: &[&str]| {
+            let lines = [head.as_slice(), part].concat().join("\n") + "\n";
+            std::fs::write(folder.0.join(name), lines).unwrap();
+        };
+        write("sim.clf", &body[..body.len() / 2]);
+        folder.map(&["--save-map", "@half.bin"]).unwrap();
+        write("sim.clf", &body[body.len() / 2..]);
+        folder.map(&["--start-map", "@half.bin", "--report", "@halves.json"]).unwrap();
+        for part in ["places", "particles"] {
+            assert_eq!(folder.report("whole.json")[part], folder.report("halves.json")[part], "{part}");
+        }
     }
 
     #[test]
