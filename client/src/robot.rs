@@ -21,6 +21,9 @@ use zenoh_ext::{AdvancedPublisher, AdvancedPublisherBuilderExt, CacheConfig, Mis
 
 /// Lets a server notice that the last message is missing.
 const HEARTBEAT: Duration = Duration::from_millis(500);
+/// Longest time between two rounds of sending again: a server that comes back waits for them, but
+/// not much longer.
+const RESEND_MAX: Duration = Duration::from_secs(8);
 /// How long the server may take to tell its watermark when asked.
 const ASK_WAIT: Duration = Duration::from_secs(1);
 
@@ -47,7 +50,10 @@ pub struct RobotConfig {
     pub clock: Clock,
     /// Form of the payloads.
     pub form: Form,
-    /// Messages kept until they are acknowledged; sending waits while there are so many.
+    /// Messages kept until they are acknowledged; sending waits while there are so many. No more
+    /// than the server's `gap_window` (1024 by default): then a message that got lost can never be
+    /// given up because too many came after it, only after `gap_wait_s`, and it is sent again
+    /// sooner.
     pub in_flight_max: usize,
     /// A watermark that stands still so long means that something got lost: what is above it is
     /// sent again, the next time after twice as long.
@@ -66,7 +72,7 @@ impl RobotConfig {
             boot: since_1970.as_secs(),
             clock: Clock::Unix,
             form: Form::Bincode,
-            in_flight_max: 4096,
+            in_flight_max: 1000,
             resend_after: Duration::from_secs(2),
             patience: Duration::from_secs(60),
         }
@@ -91,6 +97,8 @@ pub struct Robot {
     unacked: VecDeque<Unacked>,
     /// When the watermark last moved, or the first message after it was sent.
     moved: Instant,
+    /// When all above it was last sent again.
+    resent: Instant,
     resend_after: Duration,
     acks: watch::Receiver<Option<Ack>>,
     states: watch::Receiver<Option<RobotState>>,
@@ -116,6 +124,7 @@ impl Robot {
             publishers: BTreeMap::new(),
             unacked: VecDeque::new(),
             moved: Instant::now(),
+            resent: Instant::now(),
             resend_after,
             acks,
             states,
@@ -169,6 +178,10 @@ impl Robot {
         self.unacked.push_back(Unacked { seq, key: key.clone(), bytes: bytes.clone() });
         self.next += 1;
         self.put(&key, bytes).await?;
+        if Instant::now() >= self.resend_at() {
+            // Somewhere behind, something is missing: the server waits for it, but not for long.
+            self.resend().await?;
+        }
         self.check_refused()?;
         Ok(seq)
     }
@@ -271,7 +284,7 @@ impl Robot {
     /// Waits for the watermark to move; when it stands still, asks for it and sends again what is
     /// above it.
     async fn progress(&mut self) -> Result<(), ClientError> {
-        let deadline = (self.moved + self.resend_after).min(self.moved + self.config.patience);
+        let deadline = self.resend_at().min(self.moved + self.config.patience);
         let told = timeout_at(deadline, async {
             tokio::select! {
                 told = self.acks.changed() => told,
@@ -289,7 +302,17 @@ impl Robot {
             (self.moved, self.resend_after) = (Instant::now(), self.config.resend_after);
             return Err(ClientError::Timeout { what, after: self.config.patience });
         }
-        self.resend_after *= 2;
+        self.resend().await
+    }
+
+    fn resend_at(&self) -> Instant {
+        self.moved.max(self.resent) + self.resend_after
+    }
+
+    /// Asks for the watermark and sends again what is above it.
+    async fn resend(&mut self) -> Result<(), ClientError> {
+        self.resent = Instant::now();
+        self.resend_after = (self.resend_after * 2).min(self.config.resend_after.max(RESEND_MAX));
         let asked: Result<Ack, _> =
             ask(&self.session, &self.keys.ack(&self.config.robot), "", ASK_WAIT).await;
         match asked {

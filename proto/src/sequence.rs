@@ -29,12 +29,25 @@ pub struct Dropped {
     pub stale: u64,
 }
 
-/// Orders the messages of one robot. A gap is waited for, but neither longer than `gap_wait` nor
-/// over more than `window` later messages. Time is passed in, as in [`crate::merge::HoldBack`].
+/// How long a missing message is waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Patience {
+    /// Before the first message: who comes in the middle of a stream waits for the robot to send
+    /// again what is missing.
+    pub join_wait: Duration,
+    /// After that.
+    pub gap_wait: Duration,
+    /// In any case over no more later messages than these.
+    pub window: usize,
+}
+
+/// Orders the messages of one robot. A gap is waited for, with [`Patience`]. Time is passed in, as
+/// in [`crate::merge::HoldBack`].
 #[derive(Debug)]
 pub struct Sequencer {
-    gap_wait: Duration,
-    window: usize,
+    patience: Patience,
+    /// Whether a message has come out.
+    joined: bool,
     boot: Option<u64>,
     /// Seq that comes next.
     next: u64,
@@ -47,10 +60,10 @@ pub struct Sequencer {
 
 impl Sequencer {
     /// `watermark`: (boot, seq) of the last message of an earlier run; all up to it are known.
-    pub fn new(gap_wait: Duration, window: usize, watermark: Option<(u64, u64)>) -> Self {
+    pub fn new(patience: Patience, watermark: Option<(u64, u64)>) -> Self {
         Self {
-            gap_wait,
-            window,
+            patience,
+            joined: false,
             boot: watermark.map(|(boot, _)| boot),
             next: watermark.map_or(0, |(_, seq)| seq + 1),
             early: BTreeMap::new(),
@@ -110,16 +123,18 @@ impl Sequencer {
     fn take_ready(&mut self) {
         while let Some((_, message)) = self.early.remove(&self.next) {
             self.ready.push_back(Step::Message(message));
-            self.next += 1;
+            (self.joined, self.next) = (true, self.next + 1);
         }
     }
 
     /// Gives up gaps that were waited for long enough, the earliest first.
     fn give_up(&mut self, now: Duration) {
+        let Patience { join_wait, gap_wait, window } = self.patience;
         while let Some((&first, _)) = self.early.first_key_value() {
             // The oldest of those behind the gap has waited longest, wherever it stands.
             let oldest = self.early.values().map(|(arrived, _)| *arrived).min().unwrap_or(now);
-            if self.early.len() <= self.window && now.saturating_sub(oldest) < self.gap_wait {
+            let wait = if self.joined { gap_wait } else { join_wait };
+            if self.early.len() <= window && now.saturating_sub(oldest) < wait {
                 return;
             }
             let boot = self.boot.unwrap_or_default();
@@ -137,6 +152,11 @@ mod tests {
     use proptest::prelude::*;
 
     const WAIT: Duration = Duration::from_secs(1);
+    const JOIN: Duration = Duration::from_secs(5);
+
+    fn patience(window: usize) -> Patience {
+        Patience { join_wait: JOIN, gap_wait: WAIT, window }
+    }
 
     fn odom(boot: u64, seq: u64) -> Message {
         let header = Header { robot: "r1".into(), boot, seq, ..Default::default() };
@@ -157,7 +177,7 @@ mod tests {
             order in Just((0..40_u64).collect::<Vec<_>>()).prop_shuffle(),
             again in prop::collection::vec(0..40_usize, 0..20),
         ) {
-            let mut s = Sequencer::new(WAIT, 100, None);
+            let mut s = Sequencer::new(patience(100), None);
             let mut got = Vec::new();
             for &seq in order.iter().chain(again.iter().map(|i| &order[*i])) {
                 s.push(Duration::ZERO, odom(0, seq));
@@ -169,12 +189,12 @@ mod tests {
 
         #[test]
         fn what_is_missing_is_told_once(present in prop::collection::btree_set(0..60_u64, 1..40)) {
-            let mut s = Sequencer::new(WAIT, 100, None);
+            let mut s = Sequencer::new(patience(100), None);
             for seq in &present {
                 s.push(Duration::ZERO, odom(0, *seq));
             }
             let (mut seen, mut lost) = (Vec::new(), Vec::new());
-            for step in drain(&mut s, WAIT) {
+            for step in drain(&mut s, JOIN) {
                 match step {
                     Step::Message(m) => seen.extend(m.header().map(|h| h.seq)),
                     Step::Lost { from, to, .. } => lost.extend(from..to),
@@ -188,7 +208,7 @@ mod tests {
 
     #[test]
     fn a_gap_is_waited_for_but_not_for_ever() {
-        let mut s = Sequencer::new(WAIT, 100, None);
+        let mut s = Sequencer::new(patience(100), None);
         s.push(Duration::ZERO, odom(0, 0));
         s.push(Duration::ZERO, odom(0, 2));
         assert_eq!(drain(&mut s, Duration::from_millis(999)), messages(0, [0]));
@@ -200,8 +220,19 @@ mod tests {
     }
 
     #[test]
+    fn who_joins_in_the_middle_is_more_patient() {
+        let mut s = Sequencer::new(patience(100), Some((0, 7)));
+        s.push(Duration::ZERO, odom(0, 9));
+        assert_eq!(s.pop(JOIN - Duration::from_millis(1)), None);
+        s.push(JOIN, odom(0, 8));
+        assert_eq!(drain(&mut s, JOIN), messages(0, [8, 9]));
+        s.push(JOIN, odom(0, 11));
+        assert_eq!(s.pop(JOIN + WAIT), Some(Step::Lost { boot: 0, from: 10, to: 11 }));
+    }
+
+    #[test]
     fn a_full_window_ends_the_wait() {
-        let mut s = Sequencer::new(WAIT, 3, None);
+        let mut s = Sequencer::new(patience(3), None);
         for seq in 1..=4 {
             s.push(Duration::ZERO, odom(0, seq));
         }
@@ -211,7 +242,7 @@ mod tests {
 
     #[test]
     fn a_new_boot_ends_the_old_one() {
-        let mut s = Sequencer::new(WAIT, 100, None);
+        let mut s = Sequencer::new(patience(100), None);
         s.push(Duration::ZERO, odom(5, 0));
         s.push(Duration::ZERO, odom(5, 2));
         s.push(Duration::ZERO, odom(6, 0));
@@ -224,7 +255,7 @@ mod tests {
 
     #[test]
     fn an_earlier_run_is_gone_on_with() {
-        let mut s = Sequencer::new(WAIT, 100, Some((5, 7)));
+        let mut s = Sequencer::new(patience(100), Some((5, 7)));
         for seq in 6..10 {
             s.push(Duration::ZERO, odom(5, seq));
         }

@@ -20,6 +20,8 @@ pub struct ServerConfig {
     pub hold_back_s: f64,
     /// How long a missing message is waited for.
     pub gap_wait_s: f64,
+    /// The same for a robot in whose stream the server comes in the middle: until it sends again.
+    pub join_wait_s: f64,
     /// Over how many later messages a missing one is waited for.
     pub gap_window: usize,
     /// Messages that may wait in memory, per robot and on the way in.
@@ -44,6 +46,7 @@ impl Default for ServerConfig {
             data: "./toponym-data".into(),
             hold_back_s: 0.5,
             gap_wait_s: 3.0,
+            join_wait_s: 15.0,
             gap_window: 1024,
             queue_messages: 20_000,
             graph_period_s: 1.0,
@@ -100,6 +103,7 @@ impl ServerConfig {
         for (field, value, min) in [
             ("hold_back_s", self.hold_back_s, 0.0),
             ("gap_wait_s", self.gap_wait_s, 0.0),
+            ("join_wait_s", self.join_wait_s, 0.0),
             ("graph_period_s", self.graph_period_s, 0.01),
         ] {
             if !(min..=60.0).contains(&value) {

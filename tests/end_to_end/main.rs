@@ -4,5 +4,6 @@
 
 mod lifetime;
 mod questions;
+mod roles;
 mod site;
 mod streams;

@@ -3,6 +3,7 @@
 use super::{ServeError, serve};
 use crate::config::ServerConfig;
 use clap::{Args, ValueEnum};
+use std::io::IsTerminal;
 use std::path::PathBuf;
 use tracing_subscriber::EnvFilter;
 
@@ -39,7 +40,10 @@ pub enum LogFormat {
 /// Logs to stderr from here on; `RUST_LOG` selects, by default what concerns an operator.
 pub fn init_logging(format: LogFormat) {
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
-    let logs = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
+    let logs = tracing_subscriber::fmt()
+        .with_env_filter(filter)
+        .with_writer(std::io::stderr)
+        .with_ansi(std::io::stderr().is_terminal());
     // An error means that somebody logs already.
     let _ = match format {
         LogFormat::Text => logs.try_init(),

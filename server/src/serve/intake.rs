@@ -141,13 +141,14 @@ impl Intake {
         let mut open = true;
         while open {
             let mut next = arrivals.recv_timeout(TICK);
-            for _ in 0..BATCH {
+            for taken in 1..=BATCH {
                 match next {
                     Ok(Arrival::Stop) | Err(RecvTimeoutError::Disconnected) => open = false,
                     Ok(arrival) => self.take(arrival),
                     Err(RecvTimeoutError::Timeout) => break,
                 }
-                if !open {
+                // What is received must be taken: after the last round nothing may be fetched.
+                if !open || taken == BATCH {
                     break;
                 }
                 next = arrivals.try_recv().map_err(|_| RecvTimeoutError::Timeout);
@@ -204,7 +205,7 @@ impl Intake {
     /// The robot's state, made at need; none if there are too many robots already.
     fn robot(&mut self, id: &str) -> Option<&mut Robot> {
         if !self.robots.contains_key(id) {
-            if self.robots.len() >= self.config.robots_max {
+            if self.robots.len() >= self.config.robots_max && !self.forget_a_stranger() {
                 error!(robot = id, robots_max = self.config.robots_max, "refused: too many robots");
                 return None;
             }
@@ -212,6 +213,21 @@ impl Intake {
             self.robots.insert(id.into(), robot);
         }
         self.robots.get_mut(id)
+    }
+
+    /// Makes room by forgetting a robot that is on no map. False if there is none.
+    fn forget_a_stranger(&mut self) -> bool {
+        let stranger = self.robots.iter().find(|(_, robot)| robot.map().is_none() && robot.is_idle());
+        let Some(id) = stranger.map(|(id, _)| id.clone()) else {
+            return false;
+        };
+        self.robots.remove(&id);
+        self.reported.remove(&id);
+        lock(&self.board.robots).remove(&id);
+        let mut latest = lock(&self.board.latest);
+        latest.remove(&self.keys.state(&id));
+        latest.remove(&self.keys.ack(&id));
+        true
     }
 
     fn take_message(&mut self, id: &str, key: &str, message: Message) {
@@ -282,8 +298,12 @@ impl Intake {
             }
         };
         say.robot = Some(target.clone());
-        if let Some(robot) = self.robots.get_mut(&target) {
-            robot.push_say(arrived, say);
+        match self.robots.get_mut(&target) {
+            Some(mapping) if !mapping.is_full() => mapping.push_say(arrived, say),
+            _ => {
+                let problem = Problem::new(ErrorCode::Busy, "the map can't keep up: say it again later");
+                self.answer_say(&robot, &say.id, problem);
+            }
         }
     }
 
@@ -299,7 +319,7 @@ impl Intake {
             words: format!("I can't use that: {}.", problem.message),
             error: Some(problem),
         };
-        self.outbox.send(self.keys.heard(robot), &heard);
+        self.outbox.tell(self.keys.heard(robot), &heard);
     }
 
     fn advance(&mut self, finish: bool) {

@@ -58,6 +58,13 @@ impl Outbox {
         }
     }
 
+    /// What must arrive but concerns nobody who comes later.
+    pub fn tell<T: Serialize>(&self, key: String, value: &T) {
+        if let Some(json) = written(&key, value) {
+            let _ = self.queue.send(Parcel::Payload { key, json, must_arrive: true });
+        }
+    }
+
     /// The graph of a map as it is when its turn comes; false if there is no room now.
     pub fn graph(&self, map: &Arc<MapView>) -> bool {
         self.queue.try_send(Parcel::Graph(map.clone())).is_ok()
@@ -69,17 +76,14 @@ impl Outbox {
     }
 
     fn keep<T: Serialize>(&self, key: &str, value: &T) -> Option<Vec<u8>> {
-        match serde_json::to_vec(value) {
-            Ok(json) => {
-                lock(&self.board.latest).insert(key.into(), json.clone());
-                Some(json)
-            }
-            Err(e) => {
-                error!(key, "can't be written as JSON: {e}");
-                None
-            }
-        }
+        let json = written(key, value)?;
+        lock(&self.board.latest).insert(key.into(), json.clone());
+        Some(json)
     }
+}
+
+fn written<T: Serialize>(key: &str, value: &T) -> Option<Vec<u8>> {
+    serde_json::to_vec(value).inspect_err(|e| error!(key, "can't be written as JSON: {e}")).ok()
 }
 
 fn publish_all(board: &Board, session: &Session, parcels: &Receiver<Parcel>) {

@@ -7,7 +7,7 @@ use std::sync::mpsc::TrySendError;
 use std::time::Duration;
 use toponym_proto::answer::{ANSWER_VERSION, Ack, Counts, ErrorCode, Problem, RobotState};
 use toponym_proto::merge::HoldBack;
-use toponym_proto::sequence::{Sequencer, Step};
+use toponym_proto::sequence::{Patience, Sequencer, Step};
 use toponym_proto::{Message, Say, Setup};
 use tracing::{error, info};
 
@@ -47,10 +47,14 @@ impl Robot {
     pub fn new(id: &str, config: &ServerConfig, saved: Option<(Arc<MapView>, (u64, u64))>) -> Self {
         let (map, watermark) = saved.unzip();
         let newest = map.as_ref().map(|map| map.stamp());
-        let gap_wait = Duration::from_secs_f64(config.gap_wait_s);
+        let patience = Patience {
+            join_wait: Duration::from_secs_f64(config.join_wait_s),
+            gap_wait: Duration::from_secs_f64(config.gap_wait_s),
+            window: config.gap_window,
+        };
         Self {
             id: id.into(),
-            sequencer: Sequencer::new(gap_wait, config.gap_window, watermark),
+            sequencer: Sequencer::new(patience, watermark),
             hold: HoldBack::new(Duration::from_secs_f64(config.hold_back_s), newest),
             parked: None,
             outgoing: VecDeque::new(),
@@ -76,7 +80,11 @@ impl Robot {
 
     /// Takes in a message of the robot's streams.
     pub fn push(&mut self, now: Duration, message: Message) {
-        self.boot = self.boot.max(message.header().map(|h| h.boot));
+        let boot = message.header().map(|h| h.boot);
+        if boot > self.boot {
+            // What was wrong with an earlier start says nothing of this one.
+            (self.boot, self.no_map, self.refusal) = (boot, None, None);
+        }
         self.sequencer.push(now, message);
     }
 
