@@ -93,11 +93,18 @@ fn where_text(reply: &WhereReply) -> String {
 
 fn candidate_text(c: &Candidate) -> String {
     let from_robot = c.from_robot.as_ref().map_or(String::new(), |from| {
-        let side = if from.bearing_rad < 0.0 { "right" } else { "left" };
-        let degrees = from.bearing_rad.to_degrees().abs();
-        format!("{:.1} m away, {degrees:.0}° to the {side}, ", from.distance_m)
+        format!("{:.1} m away, {}, ", from.distance_m, bearing_text(from.bearing_rad))
     });
     format!("{from_robot}probability {:.2} (x {:.2} m, y {:.2} m)", c.probability, c.x_m, c.y_m)
+}
+
+fn bearing_text(bearing_rad: f64) -> String {
+    match bearing_rad.to_degrees().round() as i64 {
+        0 => "straight ahead".into(),
+        180 | -180 => "right behind".into(),
+        left @ 1.. => format!("{left}° to the left"),
+        right => format!("{}° to the right", -right),
+    }
 }
 
 fn labels_text(reply: &LabelsReply) -> String {
@@ -166,6 +173,19 @@ mod tests {
              or gym: 8.2 m away, 29° to the right, probability 0.20 (x 1.00 m, y -2.00 m)\n  \
              or nowhere in the map: probability 0.10\n"
         );
+    }
+
+    #[test]
+    fn bearings_are_told_from_the_nose() {
+        for (degrees, text) in [
+            (0.2, "straight ahead"),
+            (90.0, "90° to the left"),
+            (-45.0, "45° to the right"),
+            (-179.9, "right behind"),
+            (180.0, "right behind"),
+        ] {
+            assert_eq!(bearing_text(f64::to_radians(degrees)), text);
+        }
     }
 
     #[test]
