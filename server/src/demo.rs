@@ -21,6 +21,7 @@ use toponym_proto::answer::{Candidate, GraphReply, GridReply, Heard, WhereReply}
 use toponym_proto::keys::DEFAULT_SITE;
 use toponym_proto::merge::order_stamp;
 use toponym_proto::{Clock, Message, Pose};
+use tracing_subscriber::EnvFilter;
 use zenoh::Session;
 
 /// The tour is played so fast that it takes this long.
@@ -42,6 +43,13 @@ pub struct DemoArgs {
     /// Seed of the wheels', the laser's and the guide's chances
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub seed: u64,
+}
+
+/// Logs only what went wrong: the demo tells the rest itself.
+pub fn init_logging() {
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("warn,zenoh=error"));
+    // An error means that somebody logs already.
+    let _ = tracing_subscriber::fmt().with_env_filter(filter).with_writer(stderr).try_init();
 }
 
 /// Runs `demo`.
@@ -149,14 +157,13 @@ async fn listen(mut feedback: Receiver<Heard>, sentences: usize, bar: ProgressBa
 
 /// A question and its answer, a line per candidate.
 fn told(reply: &WhereReply) -> String {
-    let mut text = format!("  {}?\n", reply.name);
-    for c in &reply.candidates {
-        text += &format!("    {:>3.0} %  {}{}\n", 100.0 * c.probability, place(c), way(c));
-    }
+    let mut lines = vec![format!("  {}?", reply.name)];
+    let line = |p: f64, what: String| format!("    {:>3.0} %  {what}", 100.0 * p);
+    lines.extend(reply.candidates.iter().map(|c| line(c.probability, place(c) + &way(c))));
     if reply.p_none >= 0.005 {
-        text += &format!("    {:>3.0} %  somewhere not seen yet\n", 100.0 * reply.p_none);
+        lines.push(line(reply.p_none, "somewhere not seen yet".into()));
     }
-    text
+    lines.join("\n") + "\n"
 }
 
 fn place(c: &Candidate) -> String {

@@ -33,12 +33,15 @@ fn main() -> ExitCode {
             block_on(args::run(serve))
         }
         Command::Map(map) => map::run(&map),
-        Command::Demo(demo) => block_on(demo::run(demo)),
+        Command::Demo(demo) => {
+            demo::init_logging();
+            block_on(demo::run(demo))
+        }
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(e) => {
-            eprintln!("error: {e:#}");
+            eprintln!("error: {}", told(&e));
             ExitCode::FAILURE
         }
     }
@@ -46,4 +49,35 @@ fn main() -> ExitCode {
 
 fn block_on(work: impl Future<Output = anyhow::Result<()>>) -> anyhow::Result<()> {
     tokio::runtime::Builder::new_multi_thread().enable_all().build()?.block_on(work)
+}
+
+/// An error and its causes, each once: some repeat their cause already.
+fn told(error: &anyhow::Error) -> String {
+    error.chain().map(ToString::to_string).fold(String::new(), |text, cause| {
+        if text.is_empty() {
+            cause
+        } else if text.ends_with(&cause) {
+            text
+        } else {
+            format!("{text}: {cause}")
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use anyhow::anyhow;
+
+    #[test]
+    fn a_cause_is_told_once() {
+        let error = anyhow!("no such file").context("log.clf: no such file").context("--start-map");
+        assert_eq!(told(&error), "--start-map: log.clf: no such file");
+    }
+
+    #[test]
+    fn the_command_line_is_consistent() {
+        use clap::CommandFactory;
+        Cli::command().debug_assert();
+    }
 }
