@@ -117,7 +117,9 @@ impl Narration {
 }
 
 fn sentence(line: usize, text: &str) -> Result<Sentence, String> {
-    let fields: Fields = serde_json::from_str(text).map_err(|e| e.to_string())?;
+    // serde counts lines within the text given, which is this one.
+    let fields: Fields =
+        serde_json::from_str(text).map_err(|e| e.to_string().replace("at line 1 column", "at column"))?;
     // Microseconds: what a double still holds of a stamp of this century.
     let ns = |s: f64| (s * 1e6).round() as i64 * 1000;
     let began = match (fields.t, fields.t_rel) {
@@ -266,7 +268,7 @@ mod tests {
             ("{\"text\": \"a\"}", "neither t nor t_rel"),
             ("{\"t\": 1, \"t_rel\": 1, \"text\": \"a\"}", "both"),
             ("{\"t\": 1, \"text\": \" \"}", "empty"),
-            ("{\"t\": 1}", "missing field `text`"),
+            ("{\"t\": 1}", "missing field `text` at column 8"),
             ("{\"t\": 1e300, \"text\": \"a\"}", "out of range"),
             ("this is the gym", "expected"),
         ] {
