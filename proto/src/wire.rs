@@ -28,7 +28,7 @@ impl Stamp {
 
     /// Seconds.
     pub fn seconds(self) -> f64 {
-        self.ns.div_euclid(NS_PER_S) as f64 + self.ns.rem_euclid(NS_PER_S) as f64 * 1e-9
+        self.ns.div_euclid(NS_PER_S) as f64 + self.ns.rem_euclid(NS_PER_S) as f64 / 1e9
     }
 }
 

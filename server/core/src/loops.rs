@@ -19,6 +19,9 @@ use std::collections::BTreeMap;
 pub const SCORE_MIN: f64 = 0.75;
 /// Share of the points that both places must see.
 const OVERLAP_MIN: f64 = 0.25;
+/// Fits less certain than this in some direction are free along it, as in a bare corridor, and lie
+/// anywhere there.
+const SIGMA_MAX_M: f64 = 0.12;
 /// Places that must agree before a loop counts …
 const SUPPORT_MIN: u32 = 3;
 /// … over so much path.
@@ -152,7 +155,12 @@ impl Loops {
 }
 
 fn good(mode: &Mode) -> bool {
-    mode.score >= SCORE_MIN && mode.overlap >= OVERLAP_MIN
+    mode.score >= SCORE_MIN && mode.overlap >= OVERLAP_MIN && sigma_max_m(mode) <= SIGMA_MAX_M
+}
+
+/// Standard deviation of the translation in its least certain direction.
+fn sigma_max_m(mode: &Mode) -> f64 {
+    mode.covariance.fixed_view::<2, 2>(0, 0).into_owned().symmetric_eigenvalues().max().sqrt()
 }
 
 fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
@@ -164,7 +172,10 @@ fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
         Some(m) if m.score < SCORE_MIN => {
             format!("edge {t}–{} refused: score {:.2} < {SCORE_MIN}", p.i, m.score)
         }
-        Some(m) => format!("edge {t}–{} refused: overlap {:.2} < {OVERLAP_MIN}", p.i, m.overlap),
+        Some(m) if m.overlap < OVERLAP_MIN => {
+            format!("edge {t}–{} refused: overlap {:.2} < {OVERLAP_MIN}", p.i, m.overlap)
+        }
+        Some(m) => format!("edge {t}–{} refused: free along {:.2} m > {SIGMA_MAX_M} m", p.i, sigma_max_m(m)),
     };
     Some(Refusal { i: p.i, kind: p.kind, reason })
 }
