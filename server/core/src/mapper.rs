@@ -262,9 +262,7 @@ impl Mapper {
 
     fn tracked(&self, stamp_ns: StampNs, odom_from_body: Pose2) -> Effect {
         let map_from_body = self.map_from_body().unwrap_or_default();
-        let best = &self.filter.best().smoother;
-        let at_place = best.len().checked_sub(1).map_or_else(Matrix3::zeros, |v| best.marginal(v as Vertex));
-        let covariance = at_place + self.track.front.since_place();
+        let covariance = self.covariance();
         let lost = covariance[(0, 0)].max(covariance[(1, 1)]).sqrt() > LOST_SIGMA_M;
         Effect::Tracked {
             stamp_ns,
@@ -273,6 +271,29 @@ impl Mapper {
             covariance,
             state: if lost { TrackState::Lost } else { TrackState::Mapping },
         }
+    }
+
+    /// Covariance of the robot's pose in the best particle's map: that of the newest vertex, carried
+    /// along the chain of the places not frozen yet to the body. Right perturbation.
+    fn covariance(&self) -> Matrix3<f64> {
+        let (front, best) = (&self.track.front, &self.filter.best().smoother);
+        let newest = best.len().checked_sub(1).map(|v| v as Vertex);
+        let mut covariance = newest.map_or_else(Matrix3::zeros, |v| best.marginal(v));
+        let mut at = newest.map(|v| self.filter.graph.place(v).front_from_place);
+        let mut carry = |to: Pose2, added: Matrix3<f64>| {
+            if let Some(from) = at.replace(to) {
+                let f = to.between(&from).adjoint();
+                covariance = f * covariance * f.transpose() + added;
+            }
+        };
+        for place in front.open_places() {
+            carry(
+                place.front_from_place,
+                place.chain.information.try_inverse().unwrap_or_else(Matrix3::zeros),
+            );
+        }
+        carry(front.front_from_body(), front.since_place());
+        covariance
     }
 }
 

@@ -57,6 +57,21 @@ fn a_second_lap_closes_the_loop_that_odometry_leaves_open() {
 }
 
 #[test]
+fn uncertainty_grows_along_the_first_lap_and_shrinks_where_it_closes() {
+    let (_, effects, poses) = mapped(2, &[]);
+    let sigma_m: Vec<f64> = effects
+        .iter()
+        .filter_map(|e| match e {
+            Effect::Tracked { covariance, .. } => Some(covariance[(0, 0)].max(covariance[(1, 1)]).sqrt()),
+            _ => None,
+        })
+        .collect();
+    let lap = poses.len() / 2;
+    assert!(sigma_m[20] < sigma_m[lap / 2] && sigma_m[lap / 2] < sigma_m[lap - 1], "{:?}", sigma_m[lap - 1]);
+    assert!(sigma_m[lap + 60] < 0.5 * sigma_m[lap - 1], "{} {}", sigma_m[lap - 1], sigma_m[lap + 60]);
+}
+
+#[test]
 fn save_in_the_middle_load_and_go_on_is_the_same() {
     let all =
         events(&drive(2), &laser(), &[(30, "this is the kitchen"), (220, "the gym is near the kitchen")]);
