@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
+use toponym_core::effects::EdgeKind;
 use toponym_core::{Effect, Mapper};
 use toponym_proto::answer::{ANSWER_VERSION, Jump, MapIdentity, PoseOut};
 use toponym_proto::record::{RecordError, RecordWriter};
@@ -168,9 +169,9 @@ impl Mapping {
                 self.outbox.send(keys.jump(map), &jump);
             }
             Effect::ScanDropped { stamp_ns, reason } => warn!(map, stamp_ns, "scan dropped: {reason}"),
-            Effect::EdgeAccepted { i, j, kind, weight, reason } => {
-                info!(map, i, j, ?kind, weight, "edge: {reason}");
-            }
+            // Walking round a block brings hundreds of these; what words bring is rare.
+            Effect::EdgeAccepted { kind: EdgeKind::Distance, reason, .. } => debug!(map, "{reason}"),
+            Effect::EdgeAccepted { weight, reason, .. } => info!(map, weight, "{reason}"),
             Effect::SegmentBegan { stamp_ns, reason } => warn!(map, stamp_ns, "new segment: {reason}"),
             Effect::EdgeRefused { reason, .. } => debug!(map, "{reason}"),
             Effect::Resampled { effective_sample_size } => debug!(map, effective_sample_size, "resampled"),
