@@ -49,6 +49,11 @@ impl Sentences {
         self.waiting.pop_first().map(|(_, say)| say)
     }
 
+    /// When the next one began.
+    pub fn first_began(&self) -> Option<Stamp> {
+        self.waiting.keys().next().map(|(began, _)| *began)
+    }
+
     /// How many wait.
     pub fn len(&self) -> usize {
         self.waiting.len()
@@ -128,7 +133,10 @@ impl HoldBack {
         }
         let Some((arrived, message)) = self.held.front() else {
             let waited = now.saturating_sub(self.last_sentence);
-            return (waited >= self.hold * Self::PATIENCE).then(|| self.sentences.pop())?.map(Message::Say);
+            // Only one that is ahead of its stream need wait for more than what is on its way.
+            let ahead = self.sentences.first_began() > self.newest;
+            let patience = self.hold * if ahead { Self::PATIENCE } else { 1 };
+            return (waited >= patience).then(|| self.sentences.pop())?.map(Message::Say);
         };
         if now.saturating_sub(*arrived) < self.hold {
             return None;
@@ -278,6 +286,16 @@ mod tests {
         hold.push_say(Duration::ZERO, say(0, 100));
         assert_eq!(hold.pop(HOLD), None);
         assert_eq!(hold.pop(HOLD * HoldBack::PATIENCE), Some(Message::Say(say(0, 100))));
+    }
+
+    #[test]
+    fn a_sentence_said_to_a_quiet_robot_waits_one_hold() {
+        let mut hold = HoldBack::new(HOLD, None);
+        hold.push(Duration::ZERO, odom(0, 7));
+        assert!(hold.pop(HOLD).is_some());
+        hold.push_say(HOLD * 8, Say { began: None, ..say(0, 0) });
+        assert_eq!(hold.pop(HOLD * 8), None);
+        assert_eq!(hold.pop(HOLD * 9), Some(Message::Say(say(0, 7))));
     }
 
     #[test]
