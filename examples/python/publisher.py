@@ -25,7 +25,7 @@ def send(session, key, **fields):
 
 with zenoh.open(config) as session:
     laser = {"id": "front", "range_min_m": 0.05, "range_max_m": 30.0}
-    send(session, "setup", map="py", lasers=[laser])
+    send(session, "setup", map="main", lasers=[laser])
     for step in range(STEPS):
         x, angles = 0.02 * step - 1.0, [math.radians(d - 90) for d in range(181)]  # drives along x
         walls = [((WALL - x) / max(math.cos(a), 1e-9), WALL / max(abs(math.sin(a)), 1e-9)) for a in angles]
