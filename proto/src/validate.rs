@@ -1,7 +1,7 @@
 //! Limits, and the only place that rejects.
 
 use crate::keys::{ANY_ROBOT, check_id};
-use crate::stream::{Header, Laser, Message, Pose, Say, Scan, Setup};
+use crate::stream::{Header, Laser, Message, Pose, Say, Scan, Setup, Stamp};
 use serde::{Deserialize, Serialize};
 
 /// Why a value is refused.
@@ -54,6 +54,8 @@ impl Default for Limits {
 
 /// Integers in JSON stay exact below this (2^53).
 const INTEGER_MAX: u64 = 1 << 53;
+/// Times stay within this of the clock's zero, so that the difference of two is never too large.
+const STAMP_MAX_NS: i64 = 4_000_000_000_000_000_000;
 /// Coordinates stay within this of the origin: an odometry frame that is further off is broken.
 const COORDINATE_MAX_M: f64 = 1e6;
 /// Longest range of any laser.
@@ -89,7 +91,14 @@ fn check_header(h: &Header) -> Result<(), Invalid> {
             return Err(Invalid::new(field, format!("is {value}, must be below 2^53")));
         }
     }
-    Ok(())
+    check_stamp("stamp", h.stamp)
+}
+
+fn check_stamp(field: &str, stamp: Stamp) -> Result<(), Invalid> {
+    if (-STAMP_MAX_NS..=STAMP_MAX_NS).contains(&stamp.ns) {
+        return Ok(());
+    }
+    Err(Invalid::new(field, format!("is {} ns, must be within 4e18 ns of 0", stamp.ns)))
 }
 
 fn check_number(field: &str, value: f64, min: f64, max: f64) -> Result<(), Invalid> {
@@ -176,6 +185,11 @@ fn check_say(say: &Say, limits: &Limits) -> Result<(), Invalid> {
             check_token(field, token)?;
         }
     }
+    for (field, stamp) in [("began", say.began), ("ended", say.ended)] {
+        if let Some(stamp) = stamp {
+            check_stamp(field, stamp)?;
+        }
+    }
     if let (Some(began), Some(ended)) = (say.began, say.ended)
         && ended < began
     {
@@ -206,7 +220,7 @@ fn check_text(field: &str, text: &str, limits: &Limits) -> Result<(), Invalid> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stream::{Hearing, Odom, Stamp};
+    use crate::stream::{Hearing, Odom};
 
     fn header() -> Header {
         Header { robot: "r07".into(), ..Default::default() }
@@ -322,5 +336,22 @@ mod tests {
         let hearing = |p| vec![Hearing { text: "gem".into(), p }];
         assert_eq!(with(&|s| s.alternatives = hearing(1.5)), "alternatives[0].p");
         assert_eq!(with(&|s| (s.began, s.ended) = (Some(Stamp { ns: 2 }), Some(Stamp { ns: 1 }))), "ended");
+    }
+
+    #[test]
+    fn times_whose_difference_would_overflow_are_named() {
+        let odom = |ns| {
+            let header = Header { stamp: Stamp { ns }, ..header() };
+            Message::Odom(Odom { header, odom_from_body: Pose::default() })
+        };
+        for ns in [i64::MIN, i64::MAX, STAMP_MAX_NS + 1, -STAMP_MAX_NS - 1] {
+            let stamp = Some(Stamp { ns });
+            assert_eq!(refused(&odom(ns)), "stamp");
+            assert_eq!(refused(&Message::Say(Say { began: stamp, ..say() })), "began");
+            assert_eq!(refused(&Message::Say(Say { ended: stamp, ..say() })), "ended");
+        }
+        for ns in [STAMP_MAX_NS, -STAMP_MAX_NS] {
+            odom(ns).validate(&Limits::default()).unwrap();
+        }
     }
 }
