@@ -42,7 +42,7 @@ pub struct Laser {
     pub upside_down: bool,
     /// Ranges below mean nothing.
     pub range_min_m: f64,
-    /// Ranges at or above mean "nothing seen up to here".
+    /// Ranges at or above mean "nothing seen".
     pub range_max_m: f64,
     /// Bearing intervals `[from, to]` in the laser frame that see the robot itself.
     pub ignored_rad: Vec<(f64, f64)>,
@@ -61,8 +61,8 @@ pub struct Odom {
     pub odom_from_body: Pose2,
 }
 
-/// One sweep. Ranges: `+inf` nothing seen (clears), NaN or below the laser's minimum: no
-/// information. The number of beams may differ from sweep to sweep.
+/// One sweep. Ranges: `+inf` nothing seen (which does not clear: glass and black walls return
+/// nothing either), NaN or below the laser's minimum: no information. The number of beams may differ from sweep to sweep.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Scan {
     /// Robot id.

@@ -16,6 +16,7 @@ use crate::weigh::{Judgement, choose, judge};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// An edge says that two places are one only if they lie this near; scans tie farther ones too.
 const SAME_PLACE_M: f64 = 3.0;
@@ -28,7 +29,7 @@ pub struct Filter {
     /// Places, chain, matches.
     pub graph: Graph,
     /// What was said.
-    pub ledger: Ledger,
+    pub ledger: Arc<Ledger>,
     /// Distinct particles, best first; weights sum to one.
     pub particles: Vec<Particle>,
     loops: Loops,
@@ -38,13 +39,7 @@ impl Filter {
     /// N equal particles with nothing in them.
     pub fn new(config: Config) -> Self {
         let particles = vec![Particle::empty(config.particles.max(1))];
-        Self {
-            config,
-            graph: Graph::default(),
-            ledger: Ledger::default(),
-            particles,
-            loops: Loops::default(),
-        }
+        Self { config, graph: Graph::default(), ledger: Arc::default(), particles, loops: Loops::default() }
     }
 
     /// Algorithm 1 for a place just left.

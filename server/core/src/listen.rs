@@ -10,6 +10,7 @@ use crate::labels::{DIRECT, Evidence, LabelId, Labels, Source};
 use crate::language::{self, Act, GroundPlace, Landmark, Name, Parse, Relation, Sameness};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Sentences remembered by id; the oldest ids are forgotten beyond.
 const UTTERANCES_MAX: usize = 100_000;
@@ -63,6 +64,17 @@ impl Ledger {
         &self.entries
     }
 
+    /// Enters an utterance and returns its number.
+    fn enter(&mut self, entry: Entry) -> u32 {
+        let number = self.entries.len() as u32;
+        self.ids.insert(entry.id.clone());
+        self.entries.push(entry);
+        if let Some(oldest) = self.entries.len().checked_sub(UTTERANCES_MAX + 1) {
+            self.ids.remove(&self.entries[oldest].id);
+        }
+        number
+    }
+
     fn enter_name(&mut self, name: &Name) -> LabelId {
         if let Some(id) = self.label(name.as_str()) {
             return id;
@@ -109,12 +121,7 @@ impl Filter {
             return heard(u, HeardStatus::Refused, &parse, words);
         }
         let entry = Entry { id: u.id.clone(), stamp_ns: u.began_ns, text, parse: parse.clone(), held };
-        let number = self.ledger.entries.len() as u32;
-        self.ledger.entries.push(entry);
-        self.ledger.ids.insert(u.id.clone());
-        while self.ledger.ids.len() > UTTERANCES_MAX {
-            self.ledger.ids.pop_first();
-        }
+        let number = Arc::make_mut(&mut self.ledger).enter(entry);
         for act in &parse.acts {
             self.label(act, number, held, here);
         }
@@ -127,7 +134,7 @@ impl Filter {
     fn label(&mut self, act: &Act, utterance: u32, held: Vertex, here: &Here) {
         match act {
             Act::Label { name, again } => {
-                let label = self.ledger.enter_name(name);
+                let label = Arc::make_mut(&mut self.ledger).enter_name(name);
                 let source = if *again == Sameness::Other { Source::DirectOther } else { Source::Direct };
                 for p in &mut self.particles {
                     p.labels.add(Evidence { utterance, label, place: held, weight: DIRECT, source });
@@ -138,7 +145,7 @@ impl Filter {
                     Landmark::Here => None,
                     Landmark::Name(name) => self.ledger.label(name.as_str()),
                 };
-                let figure = self.ledger.enter_name(figure);
+                let figure = Arc::make_mut(&mut self.ledger).enter_name(figure);
                 for p in &mut self.particles {
                     let poses = (here.poses)(p);
                     let grounded = ground(*relation, figure, landmark, &p.labels, &poses, &here.path_m, held);

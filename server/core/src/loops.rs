@@ -147,6 +147,8 @@ impl Loops {
             });
         }
         fits.retain(|f| f.supported() || f.age < UNSUPPORTED_MAX);
+        // Looking back has changed who is supported.
+        fits.sort_by_key(|f| std::cmp::Reverse((f.supported(), f.support)));
         fits.truncate(FOLLOWED_MAX);
         measured.fits = fits.iter().filter(|f| f.supported()).cloned().collect();
         self.followed = fits;
@@ -222,7 +224,11 @@ fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
     Some(Fit {
         i: lead.i,
         mode,
-        kind: lead.from.origin,
+        // Only the pair that was named is a semantic edge; what follows from it is near by now.
+        kind: match lead.from.origin {
+            EdgeKind::Semantic => EdgeKind::Distance,
+            other => other,
+        },
         origin: lead.from.origin,
         support: lead.from.support + 1,
         support_path_m: lead.from.support_path_m + step_m,

@@ -8,7 +8,7 @@ use crate::graph::{Place, Vertex};
 use crate::listen::Here;
 use crate::odometry::{Odometry, Step};
 use crate::particle::{Edge, Particle};
-use crate::propose::LOST_SIGMA_M;
+use crate::propose::is_lost;
 use crate::scan::front::{FrontEnd, FrozenPlace, OpenPlace};
 use crate::scan::sweep::sweep;
 use crate::snapshot::Snapshot;
@@ -188,7 +188,7 @@ impl Mapper {
         let odometry = &self.track.odometry;
         let motion = |dt_s: f64| {
             odometry
-                .at(stamp_ns + (dt_s * 1e9) as i64)
+                .at(stamp_ns.saturating_add((dt_s * 1e9) as i64))
                 .map_or(Pose2::default(), |p| odom_from_body.between(&p))
         };
         let sweep = sweep(scan, laser, motion);
@@ -263,14 +263,20 @@ impl Mapper {
     fn tracked(&self, stamp_ns: StampNs, odom_from_body: Pose2) -> Effect {
         let map_from_body = self.map_from_body().unwrap_or_default();
         let covariance = self.covariance();
-        let lost = covariance[(0, 0)].max(covariance[(1, 1)]).sqrt() > LOST_SIGMA_M;
         Effect::Tracked {
             stamp_ns,
             map_from_body,
             map_from_odom: map_from_body.compose(&odom_from_body.inverse()),
             covariance,
-            state: if lost { TrackState::Lost } else { TrackState::Mapping },
+            state: if self.is_lost() { TrackState::Lost } else { TrackState::Mapping },
         }
+    }
+
+    /// Whether the link to older places is broken and not mended yet.
+    fn is_lost(&self) -> bool {
+        let (graph, best) = (&self.filter.graph, &self.filter.best().smoother);
+        self.track.front.open_places().any(|p| p.chain.broken)
+            || best.len().checked_sub(1).is_some_and(|v| is_lost(graph, best, v as Vertex))
     }
 
     /// Covariance of the robot's pose in the best particle's map: that of the newest vertex, carried

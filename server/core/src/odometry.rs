@@ -38,7 +38,7 @@ impl Odometry {
                 Step::Broken(format!("boot {} follows boot {}", odom.boot, self.boot))
             }
             Some((stamp_ns, last)) => {
-                let dt_s = (odom.stamp_ns - stamp_ns).max(0) as f64 * 1e-9;
+                let dt_s = odom.stamp_ns.saturating_sub(*stamp_ns).max(0) as f64 * 1e-9;
                 let d_m = last.distance_m(&odom.odom_from_body);
                 if d_m > STEP_MAX_M + SPEED_MAX_M_S * dt_s {
                     Step::Broken(format!("odometry jumped by {d_m:.1} m in {dt_s:.2} s"))
@@ -75,7 +75,8 @@ impl Odometry {
                 return Some(earlier.1);
             }
             if earlier.0 < stamp_ns && stamp_ns <= later.0 {
-                let f = (stamp_ns - earlier.0) as f64 / (later.0 - earlier.0) as f64;
+                let since = |t: StampNs| (i128::from(t) - i128::from(earlier.0)) as f64;
+                let f = since(stamp_ns) / since(later.0);
                 let twist = earlier.1.between(&later.1).log() * f;
                 return Some(earlier.1.compose(&Pose2::exp(&twist)));
             }

@@ -10,7 +10,7 @@ use crate::graph::{Graph, Vertex};
 use crate::particle::Particle;
 use crate::random::{Purpose, uniform};
 use crate::scan::front::LOCAL_PATH_M;
-use crate::smoothing::Relative;
+use crate::smoothing::{Relative, Smoother};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -45,10 +45,11 @@ pub struct Proposal {
 /// the joint covariance of the two poses.
 pub fn distance_probability(relative: &Relative, gamma_per_m2: f64) -> f64 {
     let (mean_m, sigma_m) = distance(relative);
-    // Trapezia over ± 3 σ; folding is |d|, and the integrand is even.
+    // Trapezia over ± 3 σ, none wider than the kernel; folding is |d|, and the integrand is even.
     let (mut sum, mut mass) = (0.0, 0.0);
-    for k in -6..=6 {
-        let s = f64::from(k) * 0.5;
+    let half = (3.0 * sigma_m).clamp(6.0, 300.0) as i32;
+    for k in -half..=half {
+        let s = f64::from(k) * 3.0 / f64::from(half);
         let (d, p) = (mean_m + s * sigma_m, (-0.5 * s * s).exp());
         sum += p / (1.0 + gamma_per_m2 * d * d);
         mass += p;
@@ -68,6 +69,17 @@ pub fn distance(relative: &Relative) -> (f64, f64) {
     (mean_m, along.max(0.0).sqrt())
 }
 
+/// Whether a place is tied to no older segment: the last place of each is known, seen from it, to no
+/// better than [`LOST_SIGMA_M`].
+pub fn is_lost(graph: &Graph, smoother: &Smoother, t: Vertex) -> bool {
+    let segment = |v: Vertex| graph.place(v).segment;
+    let ends: Vec<Vertex> =
+        (0..t).filter(|&i| segment(i) != segment(t) && segment(i) != segment(i + 1)).collect();
+    let sigma_m = |r: &Relative| r.covariance[(0, 0)].max(r.covariance[(1, 1)]).sqrt();
+    !ends.is_empty()
+        && smoother.relative(t, &ends).is_ok_and(|all| all.iter().all(|r| sigma_m(r) > LOST_SIGMA_M))
+}
+
 /// What equal particles would look at from place `t`: distance edges, semantic edges, and any place
 /// when it is lost. `followed` says which older places are already being followed.
 pub fn propose(
@@ -82,7 +94,7 @@ pub fn propose(
     let sigma_m = marginal[(0, 0)].max(marginal[(1, 1)]).sqrt();
     // What is being followed needs no second look; words do get one, wherever they point.
     let older = (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M) && !followed(i));
-    let lost = sigma_m > LOST_SIGMA_M;
+    let lost = is_lost(graph, smoother, t);
     let here = smoother.pose(t);
     let within_m = NEAR_M + 3.0 * sigma_m.min(LOST_SIGMA_M);
     let near: Vec<Vertex> =
@@ -107,7 +119,9 @@ pub fn propose(
         }));
     }
     if config.semantic_edges {
-        merge_semantic(&mut proposals, particle.labels.similar(t), |i| graph.apart(i, t, LOCAL_PATH_M));
+        // Names are given to places not frozen yet, too; those have nothing to match.
+        let matchable = |i| i < t && graph.apart(i, t, LOCAL_PATH_M);
+        merge_semantic(&mut proposals, particle.labels.similar(t), matchable);
     }
     draw(config.seed, graph, t, particle.count, proposals)
 }
@@ -116,10 +130,10 @@ pub fn propose(
 fn merge_semantic(
     proposals: &mut Vec<Proposal>,
     similar: BTreeMap<Vertex, f64>,
-    apart: impl Fn(Vertex) -> bool,
+    matchable: impl Fn(Vertex) -> bool,
 ) {
     for (i, probability) in similar {
-        if probability < SIMILARITY_MIN || !apart(i) {
+        if probability < SIMILARITY_MIN || !matchable(i) {
             continue;
         }
         let kind = EdgeKind::Semantic;

@@ -37,7 +37,7 @@ pub struct Snapshot {
     particles: Vec<Particle>,
     /// Poses of all places, open ones too, in the best particle's map.
     poses: Vec<Pose2>,
-    ledger: Ledger,
+    ledger: Arc<Ledger>,
     robot: Option<Pose2>,
     epoch: u64,
     rev: u64,

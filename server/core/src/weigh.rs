@@ -66,7 +66,12 @@ pub fn judge(particle: &Particle, fit: &Fit, t: Vertex, gamma_per_m2: f64) -> Op
     let log_refused = (1.0 - prior).ln() + chance_log_density(fit);
     let (hi, lo) = if log_taken > log_refused { (log_taken, log_refused) } else { (log_refused, log_taken) };
     let log_evidence = hi + (lo - hi).exp().ln_1p();
-    Some(Judgement { log_evidence, posterior: (log_taken - log_evidence).exp(), distance2 })
+    let posterior = (log_taken - log_evidence).exp();
+    (log_evidence.is_finite() && posterior.is_finite()).then_some(Judgement {
+        log_evidence,
+        posterior,
+        distance2,
+    })
 }
 
 /// p(e = 1) before the scans: eq. (7) of this particle, or the names', whichever says more.
@@ -111,24 +116,23 @@ pub fn choose(
 ) -> Choice {
     particle.log_weight += ((judgement.log_evidence - relief) / SHARED_SCANS).max(-LOG_WEIGHT_STEP_MAX);
     let p = judgement.posterior;
-    let mut taking = if p > 1.0 - CERTAIN {
+    let taking = if p > 1.0 - CERTAIN {
         particle.count
     } else if p < CERTAIN {
         0
     } else {
-        // Stochastic rounding of count · p, by a draw of this particle's own.
         let u = uniform(draw.0, (u64::from(t) << 32) | u64::from(fit.i), draw.1, Purpose::Edge);
-        (f64::from(particle.count) * p + u).floor().min(f64::from(particle.count)) as u32
+        match particle.count {
+            1 => u32::from(u < p),
+            // Stochastic rounding of count · p; both outcomes stay, each with its exact share.
+            n => ((f64::from(n) * p + u).floor() as u32).clamp(1, n - 1),
+        }
     };
-    // A fresh semantic edge is the boldest guess: its refusal stays for a while.
-    let sibling =
-        fit.kind == EdgeKind::Semantic && taking == particle.count && taking > 1 && p < 1.0 - CERTAIN;
-    if sibling {
-        taking -= 1;
-    }
     let refusing = particle.count - taking;
     // Where both outcomes stay, each has its exact share; where one was drawn, all of it.
     let both = taking > 0 && refusing > 0;
+    // A fresh semantic edge is the boldest guess: its refusal stays for a while.
+    let sibling = both && fit.kind == EdgeKind::Semantic && p > 0.5;
     let part = |count: u32, share: f64| {
         (count > 0).then(|| {
             let mut q = particle.clone();
@@ -237,6 +241,17 @@ mod tests {
         assert_eq!(taken.count + refused.count, 10);
         assert!((taken.weight() - 0.7).abs() < 1e-12 && (refused.weight() - 0.3).abs() < 1e-12);
         assert_eq!((taken.edges.len(), refused.edges.len()), (1, 0));
+    }
+
+    #[test]
+    fn an_unlikely_outcome_keeps_its_exact_share_too() {
+        for posterior in [0.01, 0.99] {
+            let judgement = Judgement { log_evidence: 0.0, posterior, distance2: 1.0 };
+            let choice = choose(chain(21, 0.1), &fit(20.0, 0.9, 3), judgement, 0.0, 20, (1, 0));
+            let (taken, refused) = (choice.taken.unwrap(), choice.refused.unwrap());
+            assert!((taken.weight() - posterior).abs() < 1e-12);
+            assert!((refused.weight() - (1.0 - posterior)).abs() < 1e-12);
+        }
     }
 
     #[test]

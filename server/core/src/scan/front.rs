@@ -114,6 +114,8 @@ pub struct FrontEnd {
     since_place: Matrix3<f64>,
     /// Odometry broke: the next scan begins a new local map.
     broken: bool,
+    /// The local map was begun anew: the next place is tied to the last by next to nothing.
+    fresh: bool,
     keys: VecDeque<Key>,
     open: VecDeque<OpenPlace>,
     /// Index of the local map; a function of `keys`.
@@ -135,6 +137,7 @@ impl FrontEnd {
             in_map: Matrix3::zeros(),
             since_place: Matrix3::zeros(),
             broken: false,
+            fresh: false,
             keys: VecDeque::new(),
             open: VecDeque::new(),
             local: None,
@@ -165,7 +168,7 @@ impl FrontEnd {
     pub fn scan(&mut self, stamp_ns: StampNs, odom_from_body: Pose2, sweep: Sweep) -> Placed {
         let mut frozen = Vec::new();
         if std::mem::take(&mut self.broken) {
-            let carried = (stamp_ns - self.stamp_ns).abs() > CARRIED_NS;
+            let carried = stamp_ns.saturating_sub(self.stamp_ns).saturating_abs() > CARRIED_NS;
             if carried || !self.resume(&sweep) {
                 frozen = self.start_over();
             }
@@ -277,6 +280,7 @@ impl FrontEnd {
     /// the old local map may be a look-alike that it was carried to.
     fn start_over(&mut self) -> Vec<FrozenPlace> {
         let frozen = self.freeze(f64::INFINITY);
+        self.fresh = true;
         self.keys.clear();
         self.local = None;
         // Far enough that nothing of the old map is taken for part of the new local one.
@@ -288,11 +292,11 @@ impl FrontEnd {
 
     /// Begins a place where the last one is far enough behind.
     fn keep_place(&mut self, stamp_ns: StampNs) -> bool {
-        let broken = self.keys.is_empty() && self.next_place > 0;
         let last = self.open.back();
         if last.is_some_and(|p| self.path_m - p.path_m < self.spacing_m) {
             return false;
         }
+        let broken = std::mem::take(&mut self.fresh);
         let previous_from_this = self.newest_place.between(&self.front_from_body);
         self.newest_place = self.front_from_body;
         let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
@@ -316,10 +320,12 @@ impl FrontEnd {
         true
     }
 
-    /// Adds the scan to the local map if it shows it from a new pose.
+    /// Adds the scan to the local map if it shows it from a pose new to the last metres of path: what
+    /// is older leaves both the local map and the places to come.
     fn keep_key(&mut self, sweep: Sweep) {
         let near = |k: &Key| {
-            k.front_from_body.distance_m(&self.front_from_body) < KEY_STEP_M
+            self.path_m - k.path_m < CONTENT_REACH_M
+                && k.front_from_body.distance_m(&self.front_from_body) < KEY_STEP_M
                 && wrap(k.front_from_body.yaw_rad - self.front_from_body.yaw_rad).abs() < KEY_TURN_RAD
         };
         if sweep.points.is_empty() || self.keys.iter().rev().take(KEYS_MAX / 2).any(near) {
@@ -344,3 +350,6 @@ impl FrontEnd {
         })
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -14,6 +14,8 @@ const NORMAL_REACH: usize = 3;
 const NORMAL_GAP_M: f64 = 0.12;
 /// Thickness over length of a neighbourhood that still counts as a line.
 const NORMAL_FLATNESS_MAX: f64 = 0.25;
+/// No robot drives farther within a sweep: such a ray's time is wrong.
+const MOVED_MAX_M: f64 = 5.0;
 /// Bins of a range image.
 const BINS: usize = 360;
 
@@ -107,6 +109,9 @@ fn hits(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Vec<Hit> {
         let (mut x_m, mut y_m) = (range * c, range * s);
         if scan.time_increment_s > 0.0 {
             let moved = motion(beam as f64 * scan.time_increment_s);
+            if moved.x_m.hypot(moved.y_m) > MOVED_MAX_M {
+                continue;
+            }
             let (bx, by) = laser.body_from_laser.apply(x_m, y_m);
             let (bx, by) = moved.apply(bx, by);
             (x_m, y_m) = laser_from_body.apply(bx, by);
@@ -249,6 +254,14 @@ mod tests {
         let inverted = Laser { upside_down: true, body_from_laser: Pose2::default(), ..laser() };
         let s = sweep(&scan(ranges), &inverted, |_| Pose2::default());
         assert!(s.points.iter().all(|p| p.y > -0.01 && (p.x - 2.0).abs() < 1e-4));
+    }
+
+    #[test]
+    fn rays_of_an_absurd_time_are_left_out() {
+        let mut s = scan(wall());
+        s.time_increment_s = 1.0;
+        let kept = sweep(&s, &laser(), |dt_s| Pose2::new(3.0 * dt_s, 0.0, 0.0)).points;
+        assert_eq!(kept.len(), 2);
     }
 
     #[test]

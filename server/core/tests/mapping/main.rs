@@ -2,7 +2,7 @@
 
 mod world;
 
-use toponym_core::effects::{EdgeKind, Effect, Effects, HeardStatus};
+use toponym_core::effects::{EdgeKind, Effect, Effects, HeardStatus, TrackState};
 use toponym_core::event::{Event, Odom, Scan};
 use toponym_core::geometry::Pose2;
 use toponym_core::query::{Answer, Query, WhereAnswer};
@@ -148,6 +148,16 @@ fn a_name_is_known_before_its_place_is_left() {
 }
 
 #[test]
+fn a_name_said_twice_before_its_place_is_left_is_no_loop() {
+    // The second place is not frozen when the first proposes.
+    let all = events(&drive(1)[..60], &laser(), &[(20, "this is the gym"), (26, "this is the gym")]);
+    let mut mapper = Mapper::new(Config::default());
+    run(&mut mapper, &all);
+    mapper.step(Event::Flush);
+    assert!(mapper.snapshot().graph().particles[0].edges.is_empty());
+}
+
+#[test]
 fn a_resent_sentence_changes_nothing() {
     let all = events(&drive(1)[..60], &laser(), &[(30, "this is the kitchen")]);
     let mut mapper = Mapper::new(Config::default());
@@ -211,6 +221,16 @@ fn a_carried_robot_finds_itself_again() {
     let mut mapper = Mapper::new(Config::default());
     let mut effects = run(&mut mapper, &all);
     effects.extend(mapper.step(Event::Flush));
+    let states: Vec<TrackState> = effects
+        .iter()
+        .filter_map(|e| match e {
+            Effect::Tracked { state, .. } => Some(*state),
+            _ => None,
+        })
+        .collect();
+    assert_eq!(states[lap.len() - 1], TrackState::Mapping);
+    assert_eq!(states[lap.len() + 10], TrackState::Lost);
+    assert_eq!(states.last(), Some(&TrackState::Mapping));
     let edges = mapper.snapshot().graph().particles[0].edges.clone();
     assert!(edges.iter().any(|e| e.kind == EdgeKind::Relocalisation), "{}", edges.len());
     let worst_m = worst_error_m(&mapper, &effects, &poses);
