@@ -11,6 +11,17 @@ use std::io::{self, BufReader, BufWriter, Read, Write};
 /// A record file begins with this line.
 pub const MAGIC: &[u8] = b"toponym-record 1\n";
 
+/// What is in a record was validated on its way in, maybe against a server's raised limits: only a
+/// damaged length is to be told from a large message.
+const LIMITS: Limits = Limits {
+    payload_bytes: 64 << 20,
+    beams: usize::MAX,
+    lasers: usize::MAX,
+    ignored_sectors: usize::MAX,
+    text_chars: usize::MAX,
+    alternatives: usize::MAX,
+};
+
 /// A record file can't be read or written.
 #[derive(Debug, thiserror::Error)]
 pub enum RecordError {
@@ -69,7 +80,6 @@ impl<W: Write> RecordWriter<W> {
 /// Reads a record: an iterator of its messages, each with the byte where it begins.
 pub struct RecordReader<R: Read> {
     input: BufReader<R>,
-    limits: Limits,
     offset: u64,
     index: u64,
     torn: bool,
@@ -88,7 +98,7 @@ impl<R: Read> RecordReader<R> {
             Err(e) => return Err(e.into()),
         }
         let offset = MAGIC.len() as u64;
-        Ok(Self { input, limits: Limits::default(), offset, index: 0, torn: false, failed: false })
+        Ok(Self { input, offset, index: 0, torn: false, failed: false })
     }
 
     /// Whether the file broke off inside its last message; known once the iterator has ended.
@@ -120,15 +130,15 @@ impl<R: Read> RecordReader<R> {
             return Ok(None);
         }
         let length = u32::from_le_bytes(length) as usize;
-        if length > self.limits.payload_bytes {
-            return Err(broken(Refused::TooLarge { bytes: length, max: self.limits.payload_bytes }));
+        if length > LIMITS.payload_bytes {
+            return Err(broken(Refused::TooLarge { bytes: length, max: LIMITS.payload_bytes }));
         }
         let mut bytes = vec![0; length];
         if self.fill(&mut bytes)? < length {
             self.torn = true;
             return Ok(None);
         }
-        let message = Message::from_bincode(&bytes, &self.limits).map_err(broken)?;
+        let message = Message::from_bincode(&bytes, &LIMITS).map_err(broken)?;
         self.index += 1;
         self.offset += 4 + length as u64;
         Ok(Some((offset, message)))
@@ -151,7 +161,7 @@ impl<R: Read> Iterator for RecordReader<R> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stream::{Say, Stamp};
+    use crate::stream::{Header, Say, Scan, Stamp};
 
     fn says() -> Vec<Message> {
         (0..3)
@@ -184,6 +194,35 @@ mod tests {
         let read: Vec<_> = reader.by_ref().map(|m| m.unwrap().1).collect();
         assert_eq!(read, says());
         assert!(!reader.torn());
+    }
+
+    #[test]
+    fn what_raised_limits_let_in_is_read() {
+        let scan = Message::Scan(Scan {
+            header: Header { robot: "r1".into(), ..Header::default() },
+            laser: "front".into(),
+            angle_min_rad: 0.0,
+            angle_increment_rad: 1e-5,
+            time_increment_s: 0.0,
+            ranges_m: vec![1.0; 300_000],
+        });
+        let say = Message::Say(Say { id: "s".into(), text: "a".repeat(2000), ..Say::default() });
+        let messages = [scan, say];
+        let mut bytes = Vec::new();
+        let mut writer = RecordWriter::new(&mut bytes).unwrap();
+        messages.iter().for_each(|m| writer.write(m).unwrap());
+        writer.flush().unwrap();
+        drop(writer);
+        let read: Vec<_> = RecordReader::new(bytes.as_slice()).unwrap().map(|m| m.unwrap().1).collect();
+        assert_eq!(read, messages);
+    }
+
+    #[test]
+    fn a_damaged_length_is_an_error() {
+        let mut bytes = MAGIC.to_vec();
+        bytes.extend(u32::MAX.to_le_bytes());
+        let error = RecordReader::new(bytes.as_slice()).unwrap().next().unwrap().unwrap_err();
+        assert!(matches!(error, RecordError::Message { source: Refused::TooLarge { .. }, .. }), "{error}");
     }
 
     #[test]
