@@ -4,7 +4,7 @@ use super::carmen::{self, Line, ScanLine};
 use super::{LogError, LogRecord, Notes, Options, Records};
 use std::collections::VecDeque;
 use toponym_proto::stream::Laser;
-use toponym_proto::{Clock, Header, Message, Odom, Pose, Scan, Setup, Stamp};
+use toponym_proto::{Clock, Header, Limits, Message, Odom, Pose, Scan, Setup, Stamp};
 
 /// The only laser of these logs.
 const LASER: &str = "front";
@@ -56,50 +56,57 @@ impl CarmenLog {
             ready: VecDeque::new(),
             notes,
         };
-        let setup = Setup {
-            header: log.header(survey.first_stamp),
+        let setup = Message::Setup(Setup {
+            header: log.header(0, survey.first_stamp),
             map: options.map.clone(),
             lasers: vec![survey.laser],
-        };
-        log.emit(Message::Setup(setup), false, survey.first_stamp_text);
+        });
+        check(&setup).map_err(|why| LogError::Setup { file: log.notes.file.clone(), why })?;
+        log.emit(setup, false, survey.first_stamp_text);
         Ok(log)
     }
 
-    fn header(&mut self, stamp: Stamp) -> Header {
-        let seq = self.seq;
-        self.seq += 1;
-        Header { robot: self.options.robot.clone(), boot: self.options.boot, seq, stamp, clock: Clock::Log }
+    /// The header of the next message but `ahead`.
+    fn header(&self, ahead: u64, stamp: Stamp) -> Header {
+        let (robot, boot) = (self.options.robot.clone(), self.options.boot);
+        Header { robot, boot, seq: self.seq + ahead, stamp, clock: Clock::Log }
     }
 
+    /// Hands out a message that is checked and has the next header.
     fn emit(&mut self, message: Message, odom_row: bool, stamp_text: String) {
+        self.seq += 1;
         self.notes.count(&message);
         self.ready.push_back(LogRecord { message, line: self.line, odom_row, stamp_text });
     }
 
     fn odom(&mut self, odom_from_body: Pose, text: &str, odom_row: bool) -> Result<(), String> {
         let stamp = carmen::stamp(text)?;
+        let message = Message::Odom(Odom { header: self.header(0, stamp), odom_from_body });
+        check(&message)?;
         self.last_odom = Some((odom_from_body, stamp));
-        let header = self.header(stamp);
-        self.emit(Message::Odom(Odom { header, odom_from_body }), odom_row, text.to_owned());
+        self.emit(message, odom_row, text.to_owned());
         Ok(())
     }
 
     fn scan(&mut self, scan: ScanLine<'_>) -> Result<(), String> {
         let stamp = carmen::stamp(scan.stamp)?;
-        if self.last_odom != Some((scan.odom_from_body, stamp)) {
-            self.odom(scan.odom_from_body, scan.stamp, !self.has_odom)?;
-        }
+        let brings_odom = self.last_odom != Some((scan.odom_from_body, stamp));
         let beyond = self.range_max_m as f32;
         let mut ranges_m = scan.ranges_m;
         ranges_m.iter_mut().filter(|r| **r >= beyond).for_each(|r| *r = f32::INFINITY);
         let message = Message::Scan(Scan {
-            header: self.header(stamp),
+            header: self.header(u64::from(brings_odom), stamp),
             laser: LASER.into(),
             angle_min_rad: scan.angle_min_rad,
             angle_increment_rad: scan.angle_increment_rad,
             time_increment_s: 0.0,
             ranges_m,
         });
+        // First of all: of a bad line not even the odometry is taken.
+        check(&message)?;
+        if brings_odom {
+            self.odom(scan.odom_from_body, scan.stamp, !self.has_odom)?;
+        }
         self.emit(message, false, scan.stamp.to_owned());
         Ok(())
     }
@@ -121,6 +128,11 @@ impl CarmenLog {
             }
         }
     }
+}
+
+/// What a server would refuse is not read either: a log makes the same map offline and online.
+fn check(message: &Message) -> Result<(), String> {
+    message.validate(&Limits::default()).map_err(|invalid| invalid.to_string())
 }
 
 impl Iterator for CarmenLog {

@@ -109,6 +109,36 @@ fn a_bad_line_costs_that_line_only_and_is_named() {
 }
 
 #[test]
+fn what_a_server_refuses_is_a_bad_line_too() {
+    let laser = "ROBOTLASER1 0 -1.5 3 STEP 80 0.01 0 2 1 1 0 0 0 0 0 0 0 0 0 0 0 0 2 h 2\n";
+    let wide = |beams: usize| format!("FLASER {beams}{} 0 0 0 0 0 0 2 h 2\n", " 1".repeat(beams));
+    for (line, why) in [
+        ("ODOM 3e7 0 0 0 0 0 2 h 2\n".to_string(), "odom_from_body.x_m: is 30000000"),
+        (laser.replace("STEP", "0"), "angle_increment_rad: is 0"),
+        (wide(8193), "ranges_m: has 8193 entries"),
+        (SCAN_AT_1.replace("0 0 0 1 host", "3e7 0 0 2 host"), "odom_from_body.x_m: is 30000000"),
+    ] {
+        let (records, notes) = read(&format!("{SCAN_AT_1}{line}ODOM 1 0 0 0 0 0 3 h 3\n{SCAN_AT_1}"));
+        assert_eq!(kinds(&records), "SoLOoL", "{why}");
+        let seqs: Vec<u64> = records.iter().map(|r| r.message.header().unwrap().seq).collect();
+        assert_eq!(seqs, [0, 1, 2, 3, 4, 5]);
+        assert!(records.iter().all(|r| r.message.validate(&Limits::default()).is_ok()));
+        assert_eq!((notes.bad_lines, notes.first_bad[0].0), (1, 2), "{notes:?}");
+        assert!(notes.first_bad[0].1.starts_with(why), "{notes:?}");
+    }
+    let good = read(&format!("{SCAN_AT_1}{}{}", laser.replace("STEP", "0.5"), wide(8192)));
+    assert_eq!((good.1.bad_lines, good.1.scans), (0, 3), "{:?}", good.1);
+}
+
+#[test]
+fn a_setup_that_a_server_refuses_is_an_error_that_names_the_file() {
+    let text = format!("PARAM robot_frontlaser_offset 500 1 h 1\n{SCAN_AT_1}").into_bytes();
+    let notes = Notes { file: "a.log".into(), ..Notes::default() };
+    let error = CarmenLog::new(text, &Options::default(), notes).unwrap_err().to_string();
+    assert!(error.starts_with("a.log: ") && error.contains("lasers[0].x_m: is 500"), "{error}");
+}
+
+#[test]
 fn a_cut_last_line_is_a_remark_and_its_stamp_is_not_believed() {
     let cut = format!("{SCAN_AT_1}ODOM 1 2 3 0 0 0 97605");
     let (records, notes) = read(&cut);

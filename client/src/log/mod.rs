@@ -145,6 +145,14 @@ pub enum LogError {
         /// What it looks like.
         why: String,
     },
+    /// Its robot or laser is none that a server takes.
+    #[error("{file}: its setup is refused: {why}")]
+    Setup {
+        /// The file.
+        file: PathBuf,
+        /// The field and what is wrong with it.
+        why: String,
+    },
     /// Nothing in it can be mapped.
     #[error("{file}: no usable scan in {lines} lines{detail}")]
     NoScan {
