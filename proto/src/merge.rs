@@ -49,11 +49,6 @@ impl Sentences {
         self.waiting.pop_first().map(|(_, say)| say)
     }
 
-    /// When the next one began.
-    pub fn first_began(&self) -> Option<Stamp> {
-        self.waiting.keys().next().map(|(began, _)| *began)
-    }
-
     /// How many wait.
     pub fn len(&self) -> usize {
         self.waiting.len()
@@ -65,6 +60,10 @@ impl Sentences {
     }
 }
 
+/// A time of a robot's stream: boot, and stamp on the clock of that boot. Each boot is later than
+/// the one before, whatever its clock says.
+type At = (u64, Stamp);
+
 /// Keeps a robot's stream back by a fixed time after arrival and lets sentences in where the rule
 /// wants them. A sentence whose place has passed enters at once.
 ///
@@ -75,82 +74,110 @@ pub struct HoldBack {
     hold: Duration,
     /// The stream, each message with its time of arrival.
     held: VecDeque<(Duration, Message)>,
-    sentences: Sentences,
-    /// When the last sentence arrived: one that nothing in the stream is later than waits
-    /// [`HoldBack::PATIENCE`] holds for the stream to go on.
-    last_sentence: Duration,
-    /// Newest stamp that arrived.
-    newest: Option<Stamp>,
-    /// Newest stamp that went out.
-    passed: Option<Stamp>,
+    /// Sentences in the order of the rule, each with its time of arrival.
+    waiting: BTreeMap<(At, String), (Duration, Say)>,
+    /// Newest that arrived.
+    newest: Option<At>,
+    /// Newest that went out.
+    passed: Option<At>,
 }
 
 impl HoldBack {
     /// Holds that a sentence ahead of its stream waits for the stream to catch up.
     pub const PATIENCE: u32 = 10;
+    /// Sentences that wait; when there are more, the one that came first enters.
+    pub const SENTENCES_MAX: usize = 1000;
 
-    /// With nothing in it. `newest`: newest stamp of a stream that goes on, if it does.
-    pub fn new(hold: Duration, newest: Option<Stamp>) -> Self {
-        Self {
-            hold,
-            held: VecDeque::new(),
-            sentences: Sentences::default(),
-            last_sentence: Duration::ZERO,
-            newest,
-            passed: newest,
-        }
+    /// With nothing in it. `newest`: boot and newest stamp of a stream that goes on, if it does.
+    pub fn new(hold: Duration, newest: Option<(u64, Stamp)>) -> Self {
+        Self { hold, held: VecDeque::new(), waiting: BTreeMap::new(), newest, passed: newest }
     }
 
-    /// Takes in the stream's next message, in the order of `seq`.
+    /// Takes in the stream's next message, in the order of `boot`, then `seq`.
     pub fn push(&mut self, now: Duration, message: Message) {
         if let Some(header) = message.header() {
-            self.newest = self.newest.max(Some(header.stamp));
+            self.newest = self.newest.max(Some((header.boot, header.stamp)));
         }
         self.held.push_back((now, message));
     }
 
-    /// Takes in a sentence.
-    pub fn push_say(&mut self, now: Duration, say: Say) {
-        self.sentences.push(say, self.newest.unwrap_or_default());
-        self.last_sentence = now;
+    /// Takes in a sentence, said on the clock of this boot of the robot.
+    pub fn push_say(&mut self, now: Duration, boot: u64, mut say: Say) {
+        let newest = self.newest.filter(|newest| newest.0 == boot).unwrap_or_default();
+        let began = *say.began.get_or_insert(newest.1);
+        self.waiting.insert(((boot, began), say.id.clone()), (now, say));
     }
 
-    /// How many messages are held.
+    /// How many messages of the stream are held.
     pub fn len(&self) -> usize {
-        self.held.len() + self.sentences.len()
+        self.held.len()
+    }
+
+    /// How many sentences wait.
+    pub fn sentences(&self) -> usize {
+        self.waiting.len()
     }
 
     /// Whether nothing is held.
     pub fn is_empty(&self) -> bool {
-        self.held.is_empty() && self.sentences.is_empty()
+        self.held.is_empty() && self.waiting.is_empty()
+    }
+
+    /// Drops all that is held.
+    pub fn clear(&mut self) {
+        self.held.clear();
+        self.waiting.clear();
     }
 
     /// Takes the next message that is due at `now`; [`Duration::MAX`] takes all.
     pub fn pop(&mut self, now: Duration) -> Option<Message> {
         // A sentence whose place has passed gains nothing by waiting.
-        if let Some(say) = self.passed.and_then(|passed| self.sentences.pop_before(passed)) {
+        let passed = self.passed.and_then(|passed| self.pop_before(passed));
+        if let Some(say) = passed.or_else(|| self.pop_overdue(now)) {
             return Some(Message::Say(say));
         }
-        let Some((arrived, message)) = self.held.front() else {
-            let waited = now.saturating_sub(self.last_sentence);
-            // Only one that is ahead of its stream need wait for more than what is on its way.
-            let ahead = self.sentences.first_began() > self.newest;
-            let patience = self.hold * if ahead { Self::PATIENCE } else { 1 };
-            return (waited >= patience).then(|| self.sentences.pop())?.map(Message::Say);
-        };
+        let (arrived, message) = self.held.front()?;
         if now.saturating_sub(*arrived) < self.hold {
             return None;
         }
-        let stamp = order_stamp(message);
-        if let Some(say) = self.sentences.pop_before(stamp) {
+        let at = (message.header().map_or(0, |h| h.boot), order_stamp(message));
+        if let Some(say) = self.pop_before(at) {
             return Some(Message::Say(say));
         }
         let (_, message) = self.held.pop_front()?;
         // The end of a stream is no time: what is said later still waits for the stream to go on.
         if !matches!(message, Message::End(_)) {
-            self.passed = self.passed.max(Some(stamp));
+            self.passed = self.passed.max(Some(at));
         }
         Some(message)
+    }
+
+    /// Takes the next sentence that enters before a message with this time.
+    fn pop_before(&mut self, at: At) -> Option<Say> {
+        let first = self.waiting.first_entry()?;
+        (first.key().0 < at).then(|| first.remove().1)
+    }
+
+    /// Takes a sentence that has waited too long for something later, or is one too many.
+    fn pop_overdue(&mut self, now: Duration) -> Option<Say> {
+        if self.waiting.len() > Self::SENTENCES_MAX {
+            let (key, _) = self.waiting.iter().min_by_key(|(_, (arrived, _))| *arrived)?;
+            let key = key.clone();
+            return self.waiting.remove(&key).map(|(_, say)| say);
+        }
+        let next = self.held.front().map(|(arrived, _)| *arrived);
+        // Those before the newest have their place in what is held, however long that takes.
+        let from = next.and(self.newest).unwrap_or((0, Stamp { ns: i64::MIN }));
+        let mut ahead = self.waiting.range((from, String::new())..);
+        let (key, _) = ahead.find(|((at, _), (arrived, _))| {
+            // Only one that is ahead of its stream need wait for more than what is on its way.
+            let holds = if Some(*at) > self.newest || next.is_some() { Self::PATIENCE } else { 1 };
+            let due = arrived.saturating_add(self.hold.saturating_mul(holds));
+            // What came while it waited still goes first.
+            due <= now && next.is_none_or(|next| due <= next)
+        })?;
+        let key = key.clone();
+        self.waiting.remove(&key).map(|(_, say)| say)
     }
 }
 
@@ -163,7 +190,11 @@ mod tests {
     const HOLD: Duration = Duration::from_millis(500);
 
     fn odom(seq: u64, ns: i64) -> Message {
-        let header = Header { robot: "r1".into(), seq, stamp: Stamp { ns }, ..Default::default() };
+        odom_of(0, seq, ns)
+    }
+
+    fn odom_of(boot: u64, seq: u64, ns: i64) -> Message {
+        let header = Header { robot: "r1".into(), boot, seq, stamp: Stamp { ns }, ..Default::default() };
         Message::Odom(Odom { header, odom_from_body: Pose::default() })
     }
 
@@ -251,7 +282,7 @@ mod tests {
             for (t, _, m) in all {
                 let now = Duration::from_millis(t);
                 match m {
-                    Message::Say(s) => hold.push_say(now, s),
+                    Message::Say(s) => hold.push_say(now, 0, s),
                     m => hold.push(now, m),
                 }
                 drain(&mut hold, now, &mut got);
@@ -276,14 +307,14 @@ mod tests {
         hold.push(Duration::ZERO, odom(0, 5));
         assert!(hold.pop(HOLD).is_some());
         hold.push(HOLD, odom(1, 6));
-        hold.push_say(HOLD, say(0, 4));
+        hold.push_say(HOLD, 0, say(0, 4));
         assert_eq!(hold.pop(HOLD), Some(Message::Say(say(0, 4))));
     }
 
     #[test]
     fn a_sentence_ahead_of_a_silent_stream_enters_in_the_end() {
         let mut hold = HoldBack::new(HOLD, None);
-        hold.push_say(Duration::ZERO, say(0, 100));
+        hold.push_say(Duration::ZERO, 0, say(0, 100));
         assert_eq!(hold.pop(HOLD), None);
         assert_eq!(hold.pop(HOLD * HoldBack::PATIENCE), Some(Message::Say(say(0, 100))));
     }
@@ -293,7 +324,7 @@ mod tests {
         let mut hold = HoldBack::new(HOLD, None);
         hold.push(Duration::ZERO, odom(0, 7));
         assert!(hold.pop(HOLD).is_some());
-        hold.push_say(HOLD * 8, Say { began: None, ..say(0, 0) });
+        hold.push_say(HOLD * 8, 0, Say { began: None, ..say(0, 0) });
         assert_eq!(hold.pop(HOLD * 8), None);
         assert_eq!(hold.pop(HOLD * 9), Some(Message::Say(say(0, 7))));
     }
@@ -302,7 +333,7 @@ mod tests {
     fn a_sentence_without_a_time_is_said_now() {
         let mut hold = HoldBack::new(HOLD, None);
         hold.push(Duration::ZERO, odom(0, 7));
-        hold.push_say(Duration::ZERO, Say { began: None, ..say(0, 0) });
+        hold.push_say(Duration::ZERO, 0, Say { began: None, ..say(0, 0) });
         let mut got = Vec::new();
         drain(&mut hold, Duration::MAX, &mut got);
         assert_eq!(got, [odom(0, 7), Message::Say(say(0, 7))]);
@@ -310,10 +341,10 @@ mod tests {
 
     #[test]
     fn a_stream_that_goes_on_lends_its_time() {
-        let mut hold = HoldBack::new(HOLD, Some(Stamp { ns: 70 }));
-        hold.push_say(Duration::ZERO, say(0, 60));
+        let mut hold = HoldBack::new(HOLD, Some((0, Stamp { ns: 70 })));
+        hold.push_say(Duration::ZERO, 0, say(0, 60));
         assert_eq!(hold.pop(Duration::ZERO), Some(Message::Say(say(0, 60))));
-        hold.push_say(Duration::ZERO, Say { began: None, ..say(1, 0) });
+        hold.push_say(Duration::ZERO, 0, Say { began: None, ..say(1, 0) });
         assert_eq!(hold.pop(Duration::MAX), Some(Message::Say(say(1, 70))));
     }
 
@@ -323,9 +354,80 @@ mod tests {
         let mut hold = HoldBack::new(HOLD, None);
         hold.push(Duration::ZERO, odom(0, 7));
         hold.push(Duration::ZERO, end());
-        hold.push_say(Duration::ZERO, say(0, 1_000_000));
+        hold.push_say(Duration::ZERO, 0, say(0, 1_000_000));
         let mut got = Vec::new();
         drain(&mut hold, HOLD, &mut got);
         assert_eq!(got, [odom(0, 7), Message::Say(say(0, 1_000_000)), end()]);
+    }
+
+    #[test]
+    fn a_sentence_far_ahead_of_a_stream_that_goes_on_is_heard() {
+        let (mut hold, mut heard_at) = (HoldBack::new(HOLD, None), None);
+        hold.push_say(HOLD, 0, say(0, 1_000_000));
+        for i in 0..30 {
+            let now = HOLD * i;
+            hold.push(now, odom(i.into(), i.into()));
+            while let Some(m) = hold.pop(now) {
+                heard_at = heard_at.or(matches!(m, Message::Say(_)).then_some(i));
+            }
+        }
+        // Its patience ends at 11 holds; what came until then goes out before it.
+        assert_eq!(heard_at, Some(11));
+    }
+
+    #[test]
+    fn a_backlog_costs_no_sentence_its_place() {
+        let mut hold = HoldBack::new(HOLD, None);
+        for i in 0..3 {
+            hold.push(Duration::ZERO, odom(i, i as i64));
+        }
+        hold.push_say(HOLD, 0, say(0, 3));
+        hold.push_say(HOLD, 0, say(1, 4));
+        hold.push(HOLD * 2, odom(3, 4));
+        // The one sentence has its place, the other is ahead; both have waited long.
+        let mut got = Vec::new();
+        drain(&mut hold, HOLD * 100, &mut got);
+        let stream: Vec<_> = (0..3).map(|i| odom(i, i as i64)).chain([odom(3, 4)]).collect();
+        assert_eq!(got, offline(&stream, vec![say(0, 3), say(1, 4)]));
+    }
+
+    #[test]
+    fn sentences_do_not_pile_up() {
+        let mut hold = HoldBack::new(HOLD, None);
+        hold.push(Duration::ZERO, odom(0, 0));
+        for i in 0..HoldBack::SENTENCES_MAX {
+            hold.push_say(HOLD / 2, 0, say(i, 1_000_000 - i as i64));
+        }
+        assert_eq!((hold.pop(HOLD / 2), hold.len()), (None, 1));
+        hold.push_say(HOLD * 3 / 4, 0, say(5000, 0));
+        let first = hold.pop(HOLD * 3 / 4);
+        assert!(matches!(first, Some(Message::Say(say)) if say.id != "s5000"));
+        assert_eq!((hold.pop(HOLD * 3 / 4), hold.sentences()), (None, HoldBack::SENTENCES_MAX));
+    }
+
+    #[test]
+    fn a_new_boot_has_a_clock_of_its_own() {
+        let mut hold = HoldBack::new(HOLD, Some((1, Stamp { ns: 9000 })));
+        hold.push(Duration::ZERO, odom_of(1, 7, 9500));
+        hold.push(Duration::ZERO, odom_of(2, 0, 0));
+        hold.push_say(Duration::ZERO, 2, say(0, 15));
+        hold.push_say(Duration::ZERO, 2, Say { began: None, ..say(1, 0) });
+        for seq in 1..4 {
+            hold.push(Duration::ZERO, odom_of(2, seq, seq as i64 * 10));
+        }
+        let mut got = Vec::new();
+        drain(&mut hold, HOLD, &mut got);
+        let (now, later) = (Message::Say(say(1, 0)), Message::Say(say(0, 15)));
+        let old = [odom_of(1, 7, 9500), odom_of(2, 0, 0), now, odom_of(2, 1, 10), later];
+        assert_eq!(got, [&old[..], &[odom_of(2, 2, 20), odom_of(2, 3, 30)]].concat());
+    }
+
+    #[test]
+    fn what_is_cleared_is_gone() {
+        let mut hold = HoldBack::new(HOLD, None);
+        hold.push(Duration::ZERO, odom(0, 0));
+        hold.push_say(Duration::ZERO, 0, say(0, 1));
+        hold.clear();
+        assert_eq!((hold.is_empty(), hold.pop(Duration::MAX)), (true, None));
     }
 }

@@ -299,7 +299,7 @@ impl Intake {
         };
         say.robot = Some(target.clone());
         match self.robots.get_mut(&target) {
-            Some(mapping) if !mapping.is_full() => mapping.push_say(arrived, say),
+            Some(mapping) if !mapping.is_deaf() => mapping.push_say(arrived, say),
             _ => {
                 let problem = Problem::new(ErrorCode::Busy, "the map can't keep up: say it again later");
                 self.answer_say(&robot, &say.id, problem);

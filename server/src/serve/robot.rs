@@ -46,7 +46,8 @@ impl Robot {
     /// not present itself again.
     pub fn new(id: &str, config: &ServerConfig, saved: Option<(Arc<MapView>, (u64, u64))>) -> Self {
         let (map, watermark) = saved.unzip();
-        let newest = map.as_ref().map(|map| map.stamp());
+        // A boot that is not the saved one has a clock of its own.
+        let newest = map.as_ref().zip(watermark).map(|(map, (boot, _))| (boot, map.stamp()));
         let patience = Patience {
             join_wait: Duration::from_secs_f64(config.join_wait_s),
             gap_wait: Duration::from_secs_f64(config.gap_wait_s),
@@ -68,9 +69,14 @@ impl Robot {
         }
     }
 
-    /// Whether no more fits in: the map can't keep up.
+    /// Whether no more of its streams fits in: the map can't keep up.
     pub fn is_full(&self) -> bool {
         self.sequencer.len() + self.hold.len() + self.outgoing.len() >= self.queue_messages
+    }
+
+    /// Whether no more sentences fit in: not even those that are one too many have gone to the map.
+    pub fn is_deaf(&self) -> bool {
+        self.is_full() || self.hold.sentences() >= 2 * HoldBack::SENTENCES_MAX
     }
 
     /// Whether its streams go to a map.
@@ -90,7 +96,7 @@ impl Robot {
 
     /// Takes in a sentence said to the robot.
     pub fn push_say(&mut self, now: Duration, say: Say) {
-        self.hold.push_say(now, say);
+        self.hold.push_say(now, self.boot.unwrap_or_default(), say);
     }
 
     /// Counts a refusal; the newest is told in the robot's state.
