@@ -136,7 +136,7 @@ impl Intake {
         }
     }
 
-    /// Works until it is told to stop; then hands over all there is and stops the maps.
+    /// Works until it is told to stop; then hands over all that is in order and stops the maps.
     pub fn run(mut self, arrivals: &Receiver<Arrival>) {
         let mut open = true;
         while open {
@@ -156,7 +156,7 @@ impl Intake {
             self.advance(false);
         }
         // The maps' queues are bounded: each round hands over what has room.
-        while self.robots.values().any(|robot| !robot.is_idle() && robot.map().is_some()) {
+        while self.robots.values().any(|robot| !robot.is_settled() && robot.map().is_some()) {
             self.advance(true);
             std::thread::sleep(TICK);
         }

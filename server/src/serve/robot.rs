@@ -105,10 +105,12 @@ impl Robot {
         self.refusal = Some(problem);
     }
 
-    /// Moves on what is due at `now`, or everything if the stream is to `finish`.
+    /// Moves on what is due at `now`. If the stream is to `finish`: all that is in order; what lies
+    /// behind a gap is not acknowledged, so that the robot can send it again after a restart.
     pub fn advance(&mut self, now: Duration, finish: bool, find_map: &mut FindMap<'_>) {
-        let due = if finish { Duration::MAX } else { now };
-        while let Some(step) = self.parked.take().or_else(|| self.sequencer.pop(due)) {
+        // At the beginning of time no gap has been waited for long enough.
+        let (in_order, due) = if finish { (Duration::ZERO, Duration::MAX) } else { (now, now) };
+        while let Some(step) = self.parked.take().or_else(|| self.sequencer.pop(in_order)) {
             if !self.take_step(now, step, find_map) {
                 break;
             }
@@ -163,9 +165,14 @@ impl Robot {
         self.hold.is_empty() && self.outgoing.is_empty()
     }
 
+    /// Whether all that is in order was handed over.
+    pub fn is_settled(&self) -> bool {
+        self.is_drained() && self.parked.is_none()
+    }
+
     /// Whether nothing waits at all.
     pub fn is_idle(&self) -> bool {
-        self.is_drained() && self.sequencer.is_empty() && self.parked.is_none()
+        self.is_settled() && self.sequencer.is_empty()
     }
 
     /// Hands what is due to the map's queue, as far as there is room.
@@ -197,8 +204,12 @@ impl Robot {
             return;
         };
         let message = format!("map {:?} has stopped: see the server's log", map.id);
-        error!(robot = self.id, "DATA LOSS: {message}");
-        self.counts.refused += 1;
+        let dropped = 1 + self.hold.len() + self.outgoing.len();
+        error!(robot = self.id, dropped, "DATA LOSS: {message}");
+        self.counts.refused += dropped as u64;
+        // Nothing can take it any more; a setup of another map must not wait for it.
+        self.hold.clear();
+        self.outgoing.clear();
         self.no_map = Some(Problem::new(ErrorCode::Internal, message));
     }
 
@@ -227,5 +238,81 @@ impl Robot {
             counts: Counts { repeated: dropped.repeated, stale: dropped.stale, ..self.counts },
             error: self.no_map.clone().or_else(|| self.refusal.clone()),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::serve::mapping::Work;
+    use std::sync::Mutex;
+    use std::sync::atomic::AtomicI64;
+    use std::sync::mpsc::{Receiver, sync_channel};
+    use toponym_core::Mapper;
+    use toponym_proto::{Header, Odom, Pose};
+
+    const START: Duration = Duration::from_secs(100);
+
+    fn map(id: &str) -> (Arc<MapView>, Receiver<Work>) {
+        let (work, queue) = sync_channel(100);
+        let mapper = Mapper::new(ServerConfig::default().mapper);
+        let view = MapView {
+            id: id.into(),
+            uuid: "u".into(),
+            robot: "r1".into(),
+            snapshot: arc_swap::ArcSwap::new(mapper.snapshot()),
+            stamp_ns: AtomicI64::new(0),
+            recorded: Mutex::default(),
+            work,
+        };
+        (Arc::new(view), queue)
+    }
+
+    fn header(seq: u64) -> Header {
+        Header { robot: "r1".into(), boot: 1, seq, ..Header::default() }
+    }
+
+    fn setup(seq: u64, map: &str) -> Message {
+        Message::Setup(Setup { header: header(seq), map: map.into(), lasers: vec![] })
+    }
+
+    fn odom(seq: u64) -> Message {
+        Message::Odom(Odom { header: header(seq), odom_from_body: Pose::default() })
+    }
+
+    fn robot() -> Robot {
+        Robot::new("r1", &ServerConfig::default(), None)
+    }
+
+    #[test]
+    fn a_stop_leaves_what_is_behind_a_gap_to_be_sent_again() {
+        let (view, queue) = map("main");
+        let mut robot = robot();
+        for message in [setup(0, "main"), odom(1), odom(3)] {
+            robot.push(START, message);
+        }
+        robot.advance(START, true, &mut |_| Ok(view.clone()));
+        let ack = robot.ack().unwrap();
+        assert_eq!((ack.seq, ack.lost, queue.try_iter().count()), (1, 0, 2));
+        assert!(robot.is_settled());
+    }
+
+    #[test]
+    fn a_robot_whose_map_has_stopped_gets_another() {
+        let ((broken, queue), (healthy, taken)) = (map("broken"), map("main"));
+        drop(queue);
+        let mut robot = robot();
+        for message in [setup(0, "broken"), odom(1), odom(2)] {
+            robot.push(START, message);
+        }
+        let mut find = |setup: &Setup| Ok(if setup.map == "main" { healthy.clone() } else { broken.clone() });
+        robot.advance(START, false, &mut find);
+        let later = START * 2;
+        robot.advance(later, false, &mut find);
+        assert_eq!((robot.map().is_none(), robot.state().counts.refused), (true, 3));
+        robot.push(later, setup(3, "main"));
+        robot.advance(later, false, &mut find);
+        robot.advance(later * 2, false, &mut find);
+        assert_eq!((robot.ack().map(|ack| ack.seq), taken.try_iter().count()), (Some(3), 1));
     }
 }
