@@ -79,6 +79,37 @@ async fn a_data_folder_in_use_is_named() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_record_is_never_overwritten() {
+    let folder = Folder::new();
+    let record = folder.0.join("run.rec");
+    std::fs::write(&record, b"the only one").unwrap();
+    let error =
+        Server::start(settings(&folder), Some(record.clone())).await.err().expect("an error").to_string();
+    assert!(error.contains("run.rec") && error.contains("move the earlier record away"), "{error}");
+    assert_eq!(std::fs::read(&record).unwrap(), b"the only one");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_record_that_cannot_be_written_is_told_at_the_start() {
+    let folder = Folder::new();
+    let record = folder.0.join("no_such_folder/run.rec");
+    let error = Server::start(settings(&folder), Some(record)).await.err().expect("an error").to_string();
+    assert!(error.contains("no_such_folder/run.rec"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_start_that_fails_leaves_no_record() {
+    let (folder, other) = (Folder::new(), Folder::new());
+    let site = Site::start(settings(&folder)).await;
+    let mut config = settings(&other);
+    config.listen = site.server.endpoints().to_vec();
+    let record = other.0.join("run.rec");
+    assert!(Server::start(config, Some(record.clone())).await.is_err());
+    assert!(!record.exists());
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_broken_map_is_not_overwritten() {
     let folder = Folder::new();
     let config = settings(&folder);

@@ -13,7 +13,7 @@ pub struct ServeArgs {
     /// Settings (TOML); without it the defaults hold
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Record what the map takes in, in its order; `map FILE` plays it back
+    /// Record what the map takes in, in its order; `map FILE` plays it back. The file must not exist yet
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
     /// Check the settings and show them, but do not serve

@@ -31,20 +31,20 @@ pub struct Maps {
     board: Arc<Board>,
     outbox: Outbox,
     store: Arc<Store>,
-    record: Option<PathBuf>,
+    record: Option<Record>,
     threads: Vec<JoinHandle<()>>,
     /// The saved map of each robot that it was on last, and (boot, seq) of the last message in it.
     saved: BTreeMap<String, (Arc<MapView>, (u64, u64))>,
 }
 
 impl Maps {
-    /// None yet. `record`: where to record the first map; others get their id added to the name.
+    /// None yet. `record`: of the first map; others get their id added to its name.
     pub fn new(
         config: ServerConfig,
         board: Arc<Board>,
         outbox: Outbox,
         store: Arc<Store>,
-        record: Option<PathBuf>,
+        record: Option<Record>,
     ) -> Self {
         Self { config, board, outbox, store, record, threads: Vec::new(), saved: BTreeMap::new() }
     }
@@ -97,10 +97,7 @@ impl Maps {
     }
 
     fn start(&mut self, id: &str, mapper: Mapper, card: Card) -> io::Result<Arc<MapView>> {
-        let record = match self.record_path(id) {
-            Some(path) => Some(open_record(&path).map_err(io::Error::other)?),
-            None => None,
-        };
+        let record = self.record.as_mut().map(|record| record.of_map(id)).transpose()?;
         let (work, queue) = sync_channel(QUEUE);
         let view = Arc::new(MapView {
             id: id.into(),
@@ -130,18 +127,6 @@ impl Maps {
         Ok(view)
     }
 
-    /// Where a map is recorded: the first under the name given, others with their id added.
-    fn record_path(&self, id: &str) -> Option<PathBuf> {
-        let path = self.record.as_ref()?;
-        if self.threads.is_empty() {
-            return Some(path.clone());
-        }
-        let mut name = path.as_os_str().to_owned();
-        name.push(format!(".{id}"));
-        warn!(map = id, path = %Path::new(&name).display(), "a further map is recorded in a file of its own");
-        Some(name.into())
-    }
-
     /// Lets every map work off its queue and save itself; returns when all have.
     pub fn stop(&mut self) {
         for view in self.board.maps.load().values() {
@@ -156,10 +141,52 @@ impl Maps {
     }
 }
 
-fn open_record(path: &Path) -> Result<RecordWriter<File>, RecordError> {
-    RecordWriter::new(
-        File::create(path).map_err(|e| io::Error::new(e.kind(), format!("{}: {e}", path.display())))?,
-    )
+/// Where maps are recorded: the first under the name given, others with their id added.
+pub struct Record {
+    path: PathBuf,
+    /// For the first map, until there is one.
+    first: Option<RecordWriter<File>>,
+}
+
+impl Record {
+    /// Makes the file. One that is there already is an error: it may be all that is left of a map.
+    pub fn create(path: PathBuf) -> io::Result<Self> {
+        let first = Some(create_record(&path)?);
+        Ok(Self { path, first })
+    }
+
+    fn of_map(&mut self, id: &str) -> io::Result<RecordWriter<File>> {
+        if let Some(first) = self.first.take() {
+            return Ok(first);
+        }
+        let mut name = self.path.as_os_str().to_owned();
+        name.push(format!(".{id}"));
+        let path = Path::new(&name);
+        warn!(map = id, path = %path.display(), "a further map is recorded in a file of its own");
+        create_record(path)
+    }
+}
+
+fn create_record(path: &Path) -> io::Result<RecordWriter<File>> {
+    let named = |e: io::Error| {
+        let hint = match e.kind() {
+            io::ErrorKind::AlreadyExists => "; move the earlier record away or give --record another file",
+            _ => "",
+        };
+        io::Error::new(e.kind(), format!("record {}: {e}{hint}", path.display()))
+    };
+    let mut record =
+        File::create_new(path).and_then(|f| RecordWriter::new(f).map_err(into_io)).map_err(named)?;
+    // The first line is written at once: better told now than at the first scan.
+    record.flush().map_err(into_io).map_err(named)?;
+    Ok(record)
+}
+
+fn into_io(error: RecordError) -> io::Error {
+    match error {
+        RecordError::Io(e) => e,
+        other => io::Error::other(other),
+    }
 }
 
 /// 128 random bits in the usual notation.

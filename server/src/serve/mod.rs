@@ -27,7 +27,7 @@ use crate::config::{ConfigError, ServerConfig};
 use crate::store::{Store, StoreError};
 use board::Board;
 use intake::{Door, Intake};
-use maps::Maps;
+use maps::{Maps, Record};
 use outbox::Outbox;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -85,7 +85,7 @@ pub struct Server {
 }
 
 /// Serves until `shutdown` is ready; then takes in what has arrived, saves all maps and returns.
-/// `record`: file for the merged stream of messages.
+/// `record`: file for the merged stream of messages; it must not exist yet.
 pub async fn serve(
     config: ServerConfig,
     record: Option<PathBuf>,
@@ -107,6 +107,8 @@ impl Server {
         let session = network::open(&config).await?;
         let endpoints = session.info().locators().await.iter().map(ToString::to_string).collect();
         let board = Arc::new(Board::new(keys.clone(), &config.site));
+        // After the network: a start that fails for a port in use leaves no record in the way of the next.
+        let record = record.map(Record::create).transpose()?;
         let (outbox, publisher) = Outbox::start(board.clone(), session.clone())?;
         let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, record);
         maps.start_saved(saved)?;
