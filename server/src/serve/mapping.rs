@@ -73,8 +73,8 @@ pub struct Mapping {
 }
 
 impl Mapping {
-    /// Works until it is told to stop, then saves the map.
-    pub fn run(mut self, work: &Receiver<Work>) {
+    /// Works until it is told to stop, then saves the map; tells whether it could.
+    pub fn run(mut self, work: &Receiver<Work>) -> Result<(), StoreError> {
         loop {
             let idle = match work.recv_timeout(SNAPSHOT_PERIOD) {
                 Ok(Work::Take(message)) => {
@@ -100,10 +100,9 @@ impl Mapping {
         }
         self.sync_record();
         self.show();
-        match self.save() {
-            Ok(()) => info!(map = self.view.id, "saved"),
-            Err(e) => error!(map = self.view.id, "DATA LOSS: the map could not be saved: {e}"),
-        }
+        self.save()?;
+        info!(map = self.view.id, "saved");
+        Ok(())
     }
 
     /// Shows the posterior to those who ask.

@@ -20,7 +20,7 @@ use super::board::{Board, MapView};
 use super::mapping::{Due, Mapping, Work};
 use super::outbox::Outbox;
 use crate::config::ServerConfig;
-use crate::store::{Card, Store};
+use crate::store::{Card, Store, StoreError};
 
 /// Messages that wait in front of the filter; those before them wait with their robot.
 const QUEUE: usize = 256;
@@ -32,7 +32,7 @@ pub struct Maps {
     outbox: Outbox,
     store: Arc<Store>,
     record: Option<Record>,
-    threads: Vec<JoinHandle<()>>,
+    threads: Vec<JoinHandle<Result<(), StoreError>>>,
     /// The saved map of each robot that it was on last, and (boot, seq) of the last message in it.
     saved: BTreeMap<String, (Arc<MapView>, (u64, u64))>,
 }
@@ -127,17 +127,24 @@ impl Maps {
         Ok(view)
     }
 
-    /// Lets every map work off its queue and save itself; returns when all have.
-    pub fn stop(&mut self) {
+    /// Lets every map work off its queue and save itself; returns when all have, with what became
+    /// of those that could not.
+    pub fn stop(&mut self) -> Vec<String> {
         for view in self.board.maps.load().values() {
             let _ = view.work.send(Work::Stop);
         }
+        let mut failed = Vec::new();
         for thread in self.threads.drain(..) {
             let name = thread.thread().name().unwrap_or_default().to_string();
-            if thread.join().is_err() {
-                error!("DATA LOSS: the thread of {name} failed; its map is as last saved");
-            }
+            let why = match thread.join() {
+                Ok(Ok(())) => continue,
+                Ok(Err(e)) => format!("{name} could not be saved: {e}"),
+                Err(_) => format!("{name} is as last saved: its thread failed, see the log"),
+            };
+            error!("DATA LOSS: {why}");
+            failed.push(why);
         }
+        failed
     }
 }
 
