@@ -66,7 +66,7 @@ pub struct Laser {
     pub upside_down: bool,
     /// Below: no information.
     pub range_min_m: f64,
-    /// From here on: nothing seen, clears up to here.
+    /// From here on: nothing seen.
     pub range_max_m: f64,
     /// Bearing intervals `[from, to]` that see the robot itself, laser frame, radians.
     #[serde(default)]
