@@ -210,7 +210,9 @@ mod tests {
         let messages = [scan, say];
         let mut bytes = Vec::new();
         let mut writer = RecordWriter::new(&mut bytes).unwrap();
-        messages.iter().for_each(|m| writer.write(m).unwrap());
+        for message in &messages {
+            writer.write(message).unwrap();
+        }
         writer.flush().unwrap();
         drop(writer);
         let read: Vec<_> = RecordReader::new(bytes.as_slice()).unwrap().map(|m| m.unwrap().1).collect();
