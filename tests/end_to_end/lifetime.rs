@@ -110,6 +110,21 @@ async fn a_start_that_fails_leaves_no_record() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn a_map_that_cannot_be_saved_is_an_error_of_the_stop() {
+    let folder = Folder::new();
+    let site = Site::start(settings(&folder)).await;
+    let acks = site.acks("r1").await;
+    for message in drive("r1", "main").iter().take(3) {
+        site.send(message).await;
+    }
+    acks.ack_of(2).await;
+    // A folder stands where the map is to be written.
+    std::fs::create_dir(folder.0.join("data/main.map.new")).unwrap();
+    let error = site.server.stop().await.unwrap_err().to_string();
+    assert!(error.contains("map main could not be saved") && error.contains("main.map.new"), "{error}");
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn a_broken_map_is_not_overwritten() {
     let folder = Folder::new();
     let config = settings(&folder);

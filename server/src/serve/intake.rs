@@ -137,7 +137,8 @@ impl Intake {
     }
 
     /// Works until it is told to stop; then hands over all that is in order and stops the maps.
-    pub fn run(mut self, arrivals: &Receiver<Arrival>) {
+    /// Returns what became of those that could not be saved.
+    pub fn run(mut self, arrivals: &Receiver<Arrival>) -> Vec<String> {
         let mut open = true;
         while open {
             let mut next = arrivals.recv_timeout(TICK);
@@ -161,8 +162,9 @@ impl Intake {
             std::thread::sleep(TICK);
         }
         self.advance(true);
-        self.maps.stop();
+        let failed = self.maps.stop();
         self.report(true);
+        failed
     }
 
     fn now(&self) -> Duration {

@@ -61,6 +61,9 @@ pub enum ServeError {
     /// Zenoh.
     #[error(transparent)]
     Network(#[from] NetworkError),
+    /// Maps that are not as they were when the server stopped.
+    #[error("{}", .0.join("; "))]
+    NotSaved(Vec<String>),
     /// Threads, files.
     #[error(transparent)]
     Io(#[from] std::io::Error),
@@ -77,7 +80,7 @@ pub struct Server {
     session: Session,
     board: Arc<Board>,
     door: Door,
-    intake: JoinHandle<()>,
+    intake: JoinHandle<Vec<String>>,
     outbox: Outbox,
     publisher: JoinHandle<()>,
     _token: zenoh::liveliness::LivelinessToken,
@@ -129,18 +132,22 @@ impl Server {
         &self.endpoints
     }
 
-    /// Takes in what has arrived, saves all maps, closes the network.
+    /// Takes in what has arrived, saves all maps, closes the network. A map that could not be saved
+    /// is an error, told when all is closed.
     pub async fn stop(self) -> Result<(), ServeError> {
         let Self { session, door, intake, outbox, publisher, .. } = self;
         let done = tokio::task::spawn_blocking(move || {
             door.close();
             let intake = intake.join();
             outbox.stop();
-            intake.and(publisher.join())
+            let publisher = publisher.join();
+            intake.and_then(|failed| publisher.map(|()| failed))
         });
         let joined = done.await.map_err(std::io::Error::other)?;
         session.close().await?;
-        joined.map_err(|_| std::io::Error::other("a thread of the server failed: see the log").into())
+        let failed =
+            joined.map_err(|_| std::io::Error::other("a thread of the server failed: see the log"))?;
+        if failed.is_empty() { Ok(()) } else { Err(ServeError::NotSaved(failed)) }
     }
 }
 
