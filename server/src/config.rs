@@ -45,7 +45,7 @@ impl Default for ServerConfig {
             listen: vec![DEFAULT_ENDPOINT.into()],
             data: "./toponym-data".into(),
             hold_back_s: 0.5,
-            gap_wait_s: 3.0,
+            gap_wait_s: 10.0,
             join_wait_s: 15.0,
             gap_window: 1024,
             queue_messages: 20_000,

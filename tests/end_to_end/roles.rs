@@ -40,6 +40,8 @@ async fn a_restart_of_the_server_loses_nothing() {
     let stream = drive("r1", "main");
     for (folder, stops) in [(&folder, true), (&whole, false)] {
         let mut config = settings(folder);
+        // The robot sends again what is missing, however long this machine takes over it.
+        config.gap_wait_s = 60.0;
         let running = Server::start(config.clone(), None).await.unwrap();
         config.listen = running.endpoints().to_vec();
         let mut server = Some(running);
