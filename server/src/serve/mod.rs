@@ -33,7 +33,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
 use std::time::Duration;
-use tokio::sync::Semaphore;
 use toponym_proto::Keys;
 use toponym_proto::answer::{ErrorCode, ErrorReply, Problem};
 use toponym_proto::codec::ENCODING_JSON;
@@ -42,10 +41,6 @@ use zenoh::query::Query;
 use zenoh::{Session, Wait};
 use zenoh_ext::{AdvancedSubscriberBuilderExt, HistoryConfig, RecoveryConfig};
 
-/// Queries answered at the same time; more get `busy`.
-const QUERIES_MAX: usize = 64;
-/// Grids and commands at the same time.
-const HEAVY_MAX: usize = 2;
 /// How long a robot's cache may take to answer.
 const HISTORY_WAIT: Duration = Duration::from_secs(2);
 
@@ -171,23 +166,19 @@ async fn subscribe(session: &Session, keys: &Keys, door: &Door) -> Result<(), ze
 
 async fn answer_queries(session: &Session, board: &Arc<Board>) -> Result<(), zenoh::Error> {
     let board = board.clone();
-    let (light, heavy) = (Arc::new(Semaphore::new(QUERIES_MAX)), Arc::new(Semaphore::new(HEAVY_MAX)));
+    let permits = queries::Permits::default();
     let runtime = tokio::runtime::Handle::current();
     session
         .declare_queryable(board.keys.everything())
-        .callback(move |query| {
-            let key = query.key_expr().as_str();
-            let permits = if queries::is_heavy(key) { &heavy } else { &light };
-            match permits.clone().try_acquire_owned() {
-                Ok(permit) => {
-                    let board = board.clone();
-                    runtime.spawn_blocking(move || {
-                        reply_to(&board, &query);
-                        drop(permit);
-                    });
-                }
-                Err(_) => reply_problem(&query, Problem::new(ErrorCode::Busy, "too many queries: try again")),
+        .callback(move |query| match permits.take(query.key_expr().as_str()) {
+            Some(permit) => {
+                let board = board.clone();
+                runtime.spawn_blocking(move || {
+                    reply_to(&board, &query);
+                    drop(permit);
+                });
             }
+            None => reply_problem(&query, Problem::new(ErrorCode::Busy, "too many queries: try again")),
         })
         .background()
         .await

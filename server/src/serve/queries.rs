@@ -2,8 +2,10 @@
 //! map shows, whatever its filter is doing.
 
 use serde::Serialize;
+use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
+use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use toponym_core::{Answer, Query};
 use toponym_proto::answer::{ANSWER_VERSION, Done, ErrorCode, Info, Problem};
 use toponym_proto::keys::Ask;
@@ -30,9 +32,41 @@ pub fn askable(board: &Board) -> Vec<String> {
     keys
 }
 
-/// Whether answering takes long enough to be kept apart from the rest.
-pub fn is_heavy(key: &str) -> bool {
-    key.ends_with("/ask/grid") || key.contains("/do/")
+/// Queries answered at the same time; more get `busy`.
+const LIGHT_MAX: usize = 64;
+/// The same for those that take long.
+const HEAVY_MAX: usize = 2;
+/// The same for commands, which wait for a map's filter and may not keep grids from being made.
+const COMMANDS_MAX: usize = 2;
+
+/// What bounds the queries answered at the same time, kind by kind.
+pub struct Permits {
+    light: Arc<Semaphore>,
+    heavy: Arc<Semaphore>,
+    commands: Arc<Semaphore>,
+}
+
+impl Default for Permits {
+    fn default() -> Self {
+        let of = |permits| Arc::new(Semaphore::new(permits));
+        Self { light: of(LIGHT_MAX), heavy: of(HEAVY_MAX), commands: of(COMMANDS_MAX) }
+    }
+}
+
+impl Permits {
+    /// A permit to answer a query on this key, which may have wildcards; none if there are too many
+    /// of its kind. Holds until it is dropped.
+    pub fn take(&self, key: &str) -> Option<OwnedSemaphorePermit> {
+        // A wildcard may select a grid.
+        let kind = if key.contains('*') || key.ends_with("/ask/grid") {
+            &self.heavy
+        } else if key.contains("/do/") {
+            &self.commands
+        } else {
+            &self.light
+        };
+        kind.clone().try_acquire_owned().ok()
+    }
 }
 
 /// Answers one query on a key without wildcards, as JSON.
@@ -68,7 +102,7 @@ fn no_such_query(key: &str) -> Problem {
     Problem::new(ErrorCode::NoSuchQuery, format!("{key} can't be asked")).field("key")
 }
 
-fn map(board: &Board, id: &str) -> Result<std::sync::Arc<MapView>, Problem> {
+fn map(board: &Board, id: &str) -> Result<Arc<MapView>, Problem> {
     let maps = board.maps.load();
     maps.get(id).cloned().ok_or_else(|| {
         let known: Vec<&str> = maps.keys().map(String::as_str).collect();
@@ -197,4 +231,36 @@ fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
         }
     }
     json(&Done { v: ANSWER_VERSION, query: "save".into(), maps: saved })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Takes permits for a key until there are none.
+    fn exhaust(permits: &Permits, key: &str) -> Vec<OwnedSemaphorePermit> {
+        std::iter::from_fn(|| permits.take(key)).collect()
+    }
+
+    #[test]
+    fn a_wildcard_counts_as_the_grid_it_may_select() {
+        for wild in ["t/v1/s/map/*/ask/*", "t/v1/s/map/main/ask/g$*", "t/v1/s/**"] {
+            let permits = Permits::default();
+            let held = exhaust(&permits, "t/v1/s/map/main/ask/grid");
+            assert_eq!(held.len(), HEAVY_MAX);
+            assert!(permits.take(wild).is_none(), "{wild}");
+            assert!(permits.take("t/v1/s/map/main/ask/where").is_some());
+        }
+    }
+
+    #[test]
+    fn saving_keeps_nobody_from_asking() {
+        let permits = Permits::default();
+        let saves = exhaust(&permits, "t/v1/s/do/save");
+        assert_eq!(saves.len(), COMMANDS_MAX);
+        assert!(permits.take("t/v1/s/map/main/ask/grid").is_some());
+        assert!(permits.take("t/v1/s/map/main/ask/where").is_some());
+        drop(saves);
+        assert!(permits.take("t/v1/s/do/save").is_some());
+    }
 }
