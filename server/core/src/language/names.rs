@@ -40,8 +40,11 @@ impl Name {
 
     /// From plain words; none if there is none beside determiners, or too many.
     pub(super) fn from_words(words: &[&str]) -> Option<Self> {
-        let name = canonical(words).join(" ");
-        (!name.is_empty() && words.len() <= 2 * MAX_NAME_WORDS).then_some(Self(name))
+        let mut canonical = canonical(words);
+        canonical.retain(|word| !word.is_empty());
+        // Spelling may add words ("2b4", "two b four"): the result must be a name, too.
+        let fits = words.len().max(canonical.len()) <= 2 * MAX_NAME_WORDS;
+        (!canonical.is_empty() && fits).then(|| Self(canonical.join(" ")))
     }
 
     /// The canonical spelling.
