@@ -5,6 +5,7 @@
 
 use crate::config::Config;
 use crate::effects::{Effect, Effects};
+use crate::geometry::Pose2;
 use crate::graph::{Graph, Vertex};
 use crate::listen::Ledger;
 use crate::loops::{Fit, Loops, Measured};
@@ -12,14 +13,13 @@ use crate::particle::Particle;
 use crate::propose::{Proposal, propose};
 use crate::resample::{effective_sample_size, merge, normalise, resample};
 use crate::scan::front::{Chain, FrozenPlace};
-use crate::weigh::{Judgement, choose, judge};
+use crate::smoothing::{FactorId, SmoothError, Structure};
+use crate::weigh::{Choice, Judgement, add_edge, choose, judge};
+use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
-
-/// An edge says that two places are one only if they lie this near; scans tie farther ones too.
-const SAME_PLACE_M: f64 = 3.0;
 
 /// The posterior over semantic graphs, and what all particles share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -30,16 +30,28 @@ pub struct Filter {
     pub graph: Graph,
     /// What was said.
     pub ledger: Arc<Ledger>,
+    /// Factors of all particles together, and in what order they are eliminated.
+    pub structure: Arc<Structure>,
     /// Distinct particles, best first; weights sum to one.
     pub particles: Vec<Particle>,
     loops: Loops,
+    /// Factors that some particles hold and others don't.
+    disputed: Vec<FactorId>,
 }
 
 impl Filter {
     /// N equal particles with nothing in them.
     pub fn new(config: Config) -> Self {
         let particles = vec![Particle::empty(config.particles.max(1))];
-        Self { config, graph: Graph::default(), ledger: Arc::default(), particles, loops: Loops::default() }
+        Self {
+            config,
+            graph: Graph::default(),
+            ledger: Arc::default(),
+            structure: Arc::default(),
+            particles,
+            loops: Loops::default(),
+            disputed: Vec::new(),
+        }
     }
 
     /// Algorithm 1 for a place just left.
@@ -61,6 +73,7 @@ impl Filter {
             self.particles = resample(std::mem::take(&mut self.particles), n, self.config.seed, t);
             effects.push(Effect::Resampled { effective_sample_size: size });
         }
+        self.forget();
         effects
     }
 
@@ -69,22 +82,42 @@ impl Filter {
         &self.particles[0]
     }
 
+    /// Makes anew what a saved filter leaves out. Before that, covariances are unknown.
+    pub fn restore(&mut self) -> Result<(), SmoothError> {
+        let structure = &self.structure;
+        self.particles.par_iter_mut().try_for_each(|p| p.belief.restore(structure))
+    }
+
     fn extend(&mut self, chain: &Chain) {
-        self.particles.par_iter_mut().for_each(|p| {
-            // Chain edges come from the front end, whose covariances are sound by construction;
-            // should one not be, the place is tied by a vague edge rather than lost.
-            if p.smoother.add_pose(chain.previous_from_this, &chain.information).is_err() {
-                let vague = nalgebra::Matrix3::identity();
-                let _ = p.smoother.add_pose(crate::Pose2::default(), &vague);
-            }
-        });
+        let structure = Arc::make_mut(&mut self.structure);
+        // Chain edges come from the front end, whose covariances are sound by construction;
+        // should one not be, the place is tied by a vague edge rather than lost.
+        if structure.add_pose(chain.previous_from_this, &chain.information).is_err() {
+            let _ = structure.add_pose(Pose2::default(), &Matrix3::identity());
+        }
+        structure.arrange();
+        self.update();
+    }
+
+    /// X of each particle given its G, (10). One whose numbers fail is dropped, unless all do: those
+    /// go on by dead reckoning.
+    fn update(&mut self) {
+        let structure = &self.structure;
+        let sound: Vec<bool> = self.particles.par_iter_mut().map(|p| p.update(structure).is_ok()).collect();
+        if sound.contains(&true) {
+            let mut sound = sound.into_iter();
+            self.particles.retain(|_| sound.next() == Some(true));
+        }
     }
 
     /// The union of what the particles would look at, one entry per older place, in order.
     fn propose(&self, t: Vertex) -> Vec<Proposal> {
         let followed = |i: Vertex| self.loops.covers(&self.graph, i);
-        let per_particle: Vec<Vec<Proposal>> =
-            self.particles.par_iter().map(|p| propose(&self.config, &self.graph, p, t, followed)).collect();
+        let per_particle: Vec<Vec<Proposal>> = self
+            .particles
+            .par_iter()
+            .map(|p| propose(&self.config, &self.graph, &self.structure, p, t, followed))
+            .collect();
         let mut union: BTreeMap<Vertex, Proposal> = BTreeMap::new();
         for p in per_particle.into_iter().flatten() {
             let known = union.entry(p.i).or_insert(p);
@@ -97,50 +130,57 @@ impl Filter {
 
     /// Each particle takes the edge of a fit or refuses it, and is weighed by the fit.
     fn take_or_refuse(&mut self, t: Vertex, fit: &Fit) -> Effect {
-        let gamma = self.config.gamma_per_m2;
-        let before = std::mem::take(&mut self.particles);
-        let judged: Vec<Option<Judgement>> = before.par_iter().map(|p| judge(p, fit, t, gamma)).collect();
+        let (structure, config) = (&self.structure, &self.config);
+        let judge = |p: &Particle| judge(structure, p, fit, t, config.gamma_per_m2);
+        let judged: Vec<Option<Judgement>> = self.particles.par_iter().map(judge).collect(); // (17–18)
         let relief = judged.iter().flatten().map(|j| j.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-        let (seed, places) = (self.config.seed, self.graph.place(fit.i).id);
-        let outcomes: Vec<(Option<Particle>, Option<Particle>)> = before
-            .into_par_iter()
-            .zip(judged.par_iter())
+        let draw = |k| (config.seed, k as u64);
+        let mut choices: Vec<Choice> = std::mem::take(&mut self.particles)
+            .into_iter()
+            .zip(&judged)
             .enumerate()
-            .map(|(k, (p, judgement))| match judgement {
-                None => (None, Some(p)),
-                Some(j) => {
-                    let mut choice = choose(p, fit, *j, relief, t, (seed, k as u64));
-                    let apart_m = fit.mode.i_from_j.x_m.hypot(fit.mode.i_from_j.y_m);
-                    if let Some(taken) = choice.taken.as_mut().filter(|_| apart_m < SAME_PLACE_M) {
-                        taken.labels.carry_over(fit.i, t);
-                    }
-                    (choice.taken, choice.refused)
-                }
-            })
-            .collect();
-        let top = outcomes
-            .iter()
-            .flat_map(|(a, b)| [a, b])
-            .flatten()
-            .map(|p| p.log_weight)
-            .fold(f64::NEG_INFINITY, f64::max);
-        let mass = |p: &Option<Particle>| p.as_ref().map_or(0.0, |p| (p.log_weight - top).exp());
-        let taken: f64 = outcomes.iter().map(|o| mass(&o.0)).sum();
-        let refused: f64 = outcomes.iter().map(|o| mass(&o.1)).sum();
-        self.particles = outcomes.into_iter().flat_map(|(a, b)| [a, b]).flatten().collect();
+            .map(|(k, (p, judgement))| choose(p, fit, *judgement, relief, t, draw(k)))
+            .collect(); // G and w
+        let wanted = choices.iter().any(|c| c.taken.is_some());
+        let edge = wanted.then(|| add_edge(Arc::make_mut(&mut self.structure), fit, t)).flatten();
+        self.disputed.extend(edge.iter().map(|e| e.factor));
+        choices.par_iter_mut().for_each(|c| c.take(&self.structure, edge.as_ref())); // X, (10)
+        let share = share_taken(&choices);
+        self.particles = choices.into_iter().flat_map(|c| [c.taken, c.refused]).flatten().collect();
         self.particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
-        report(places, t, fit, taken / (taken + refused), judged.iter().flatten().next())
+        self.update(); // X of those who refuse
+        report(t, fit, share, judged.iter().flatten().next())
+    }
+
+    /// Takes out the factors that no particle holds any more.
+    fn forget(&mut self) {
+        let (structure, particles) = (&mut self.structure, &self.particles);
+        self.disputed.retain(|&factor| {
+            let holders = particles.iter().filter(|p| p.belief.holds(factor)).count();
+            if holders == 0 {
+                let _ = Arc::make_mut(structure).remove_factor(factor);
+            }
+            0 < holders && holders < particles.len()
+        });
     }
 }
 
-fn report(i: u64, t: Vertex, fit: &Fit, weight: f64, best: Option<&Judgement>) -> Effect {
+/// Share of the posterior that took the edge.
+fn share_taken(choices: &[Choice]) -> f64 {
+    let all = || choices.iter().flat_map(|c| [&c.taken, &c.refused]).flatten();
+    let top = all().map(|p| p.log_weight).fold(f64::NEG_INFINITY, f64::max);
+    let mass = |p: &Particle| (p.log_weight - top).exp();
+    choices.iter().flat_map(|c| &c.taken).map(mass).sum::<f64>() / all().map(mass).sum::<f64>()
+}
+
+fn report(t: Vertex, fit: &Fit, weight: f64, best: Option<&Judgement>) -> Effect {
     let (posterior, distance) = best.map_or((0.0, f64::NAN), |j| (j.posterior, j.distance2.sqrt()));
     let figures = format!(
         "score {:.2}, overlap {:.2}, {} places over {:.0} m agree, {distance:.1} σ from prediction, \
          p = {posterior:.3}",
         fit.mode.score, fit.mode.overlap, fit.support, fit.support_path_m
     );
-    let (j, kind) = (u64::from(t), fit.kind);
+    let (i, j, kind) = (fit.i.into(), t.into(), fit.kind);
     if weight > 0.0 {
         Effect::EdgeAccepted { i, j, kind, weight, reason: format!("edge {t}–{i} taken: {figures}") }
     } else {
@@ -154,4 +194,68 @@ fn refusals(t: Vertex, measured: &Measured) -> Effects {
         .iter()
         .map(|r| Effect::EdgeRefused { i: r.i.into(), j: t.into(), kind: r.kind, reason: r.reason.clone() })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::EdgeKind;
+    use crate::scan::matching::Mode;
+    use nalgebra::Vector3;
+
+    /// A straight chain of places 1 m apart whose ends fit so that half of the posterior believes it.
+    fn split() -> Filter {
+        let mut filter = Filter::new(Config::default());
+        for _ in 0..21 {
+            filter.extend(&chain());
+        }
+        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
+        let mode = Mode { i_from_j: Pose2::new(17.7, 0.0, 0.0), covariance, score: 0.9, overlap: 0.6 };
+        filter.take_or_refuse(20, &Fit::supported_by(0, mode, EdgeKind::Distance, 3));
+        filter
+    }
+
+    fn chain() -> Chain {
+        let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
+        Chain { previous_from_this: Pose2::new(1.0, 0.0, 0.0), information, broken: false }
+    }
+
+    fn length_m(filter: &Filter) -> f64 {
+        filter.best().belief.pose(20).x_m
+    }
+
+    #[test]
+    fn a_fit_splits_a_particle_into_one_with_the_edge_and_one_without() {
+        let filter = split();
+        let [a, b] = &filter.particles[..] else { panic!("{}", filter.particles.len()) };
+        let (with, without) = if a.edges.is_empty() { (b, a) } else { (a, b) };
+        assert_eq!((with.edges.len(), without.edges.len(), with.count + without.count), (1, 0, 30));
+        assert!((with.belief.pose(20).x_m - 17.7).abs() < 0.05);
+        assert!((without.belief.pose(20).x_m - 20.0).abs() < 1e-9);
+        assert_eq!(filter.disputed, [with.edges[0].factor]);
+    }
+
+    #[test]
+    fn a_factor_that_no_particle_holds_any_more_is_taken_out() {
+        let mut filter = split();
+        let factor = filter.disputed[0];
+        filter.forget();
+        assert!(filter.structure.factor(factor).is_some() && filter.disputed == [factor]);
+        filter.particles.retain(|p| p.edges.is_empty());
+        filter.forget();
+        assert!(filter.structure.factor(factor).is_none() && filter.disputed.is_empty());
+        filter.extend(&chain());
+        assert!((length_m(&filter) - 20.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_factor_that_all_particles_hold_stays() {
+        let mut filter = split();
+        let factor = filter.disputed[0];
+        filter.particles.retain(|p| !p.edges.is_empty());
+        filter.forget();
+        assert!(filter.structure.factor(factor).is_some() && filter.disputed.is_empty());
+        filter.extend(&chain());
+        assert!((length_m(&filter) - 17.7).abs() < 0.05);
+    }
 }

@@ -11,6 +11,7 @@ use crate::particle::{Edge, Particle};
 use crate::propose::is_lost;
 use crate::scan::front::{FrontEnd, FrozenPlace, OpenPlace};
 use crate::scan::sweep::sweep;
+use crate::smoothing::SmoothError;
 use crate::snapshot::Snapshot;
 use crate::{Answer, Config, Event, Query};
 use nalgebra::Matrix3;
@@ -62,10 +63,13 @@ pub enum SaveError {
         /// What this build writes.
         expected: String,
     },
+    /// They are a saved map whose poses contradict themselves.
+    #[error("the saved map's poses can't be made anew: {0}")]
+    Poses(#[from] SmoothError),
 }
 
-/// Format of a saved map; changes whenever its content does.
-const FORMAT: &str = concat!("toponym map ", env!("CARGO_PKG_VERSION"), " ");
+/// Format of a saved map; its number changes whenever its content does.
+const FORMAT: &str = concat!("toponym map 2 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -129,7 +133,8 @@ impl Mapper {
             return Err(SaveError::Format { found, expected });
         }
         let rest = bytes.get(read..).unwrap_or_default();
-        let (mapper, _): (Self, usize) = bincode::serde::decode_from_slice(rest, config)?;
+        let (mut mapper, _): (Self, usize) = bincode::serde::decode_from_slice(rest, config)?;
+        mapper.filter.restore()?;
         Ok(mapper)
     }
 
@@ -234,7 +239,7 @@ impl Mapper {
         // The place held when the sentence began; one from before the map is said of its first.
         let held = stamps.iter().rposition(|&s| s <= u.began_ns).or((!stamps.is_empty()).then_some(0));
         let poses = |p: &Particle| {
-            let mut poses = p.smoother.poses().to_vec();
+            let mut poses = p.belief.poses();
             poses.extend(open_poses(p, &places, &open));
             poses
         };
@@ -251,11 +256,11 @@ impl Mapper {
 
     /// The robot in the best particle's map.
     fn map_from_body(&self) -> Option<Pose2> {
-        let (front, best) = (&self.track.front, self.filter.best());
+        let (front, best) = (&self.track.front, &self.filter.best().belief);
         let body = front.front_from_body();
-        if let Some(v) = best.smoother.len().checked_sub(1) {
+        if let Some(v) = best.len().checked_sub(1) {
             let place = self.filter.graph.place(v as Vertex);
-            return Some(best.smoother.pose(v as Vertex).compose(&place.front_from_place.between(&body)));
+            return Some(best.pose(v as Vertex).compose(&place.front_from_place.between(&body)));
         }
         front.open_places().next().map(|first| first.front_from_place.between(&body))
     }
@@ -274,17 +279,18 @@ impl Mapper {
 
     /// Whether the link to older places is broken and not mended yet.
     fn is_lost(&self) -> bool {
-        let (graph, best) = (&self.filter.graph, &self.filter.best().smoother);
+        let Filter { graph, structure, .. } = &self.filter;
+        let best = &self.filter.best().belief;
         self.track.front.open_places().any(|p| p.chain.broken)
-            || best.len().checked_sub(1).is_some_and(|v| is_lost(graph, best, v as Vertex))
+            || best.len().checked_sub(1).is_some_and(|v| is_lost(graph, structure, best, v as Vertex))
     }
 
     /// Covariance of the robot's pose in the best particle's map: that of the newest vertex, carried
     /// along the chain of the places not frozen yet to the body. Right perturbation.
     fn covariance(&self) -> Matrix3<f64> {
-        let (front, best) = (&self.track.front, &self.filter.best().smoother);
+        let (front, best) = (&self.track.front, &self.filter.best().belief);
         let newest = best.len().checked_sub(1).map(|v| v as Vertex);
-        let mut covariance = newest.map_or_else(Matrix3::zeros, |v| best.marginal(v));
+        let mut covariance = newest.map_or_else(Matrix3::zeros, |v| best.marginal(&self.filter.structure, v));
         let mut at = newest.map(|v| self.filter.graph.place(v).front_from_place);
         let mut carry = |to: Pose2, added: Matrix3<f64>| {
             if let Some(from) = at.replace(to) {
@@ -311,9 +317,9 @@ impl Track {
 
 /// Poses, in a particle's map, of the places that are not frozen yet.
 pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> {
-    let last = p.smoother.len().checked_sub(1).map(|v| v as Vertex);
+    let last = p.belief.len().checked_sub(1).map(|v| v as Vertex);
     let map_from_front = match (last, open.first()) {
-        (Some(v), _) => p.smoother.pose(v).compose(&places[v as usize].front_from_place.inverse()),
+        (Some(v), _) => p.belief.pose(v).compose(&places[v as usize].front_from_place.inverse()),
         (None, Some(first)) => first.front_from_place.inverse(),
         (None, None) => Pose2::default(),
     };

@@ -4,10 +4,13 @@ use crate::effects::EdgeKind;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::Labels;
-use crate::smoothing::Smoother;
+use crate::smoothing::{Belief, FactorId, SmoothError, Structure};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// An edge says that two places are one only if they lie this near; scans tie farther ones too.
+const SAME_PLACE_M: f64 = 3.0;
 
 /// A loop edge of G: everything but the chain of successive places.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -22,6 +25,8 @@ pub struct Edge {
     pub i_from_j: Pose2,
     /// Covariance of it, right perturbation.
     pub covariance: Matrix3<f64>,
+    /// Its factor in the structure that all particles share.
+    pub factor: FactorId,
 }
 
 /// Equal particles.
@@ -30,7 +35,7 @@ pub struct Particle {
     /// G: loop edges in the order they were added.
     pub edges: Arc<Vec<Edge>>,
     /// X.
-    pub smoother: Smoother,
+    pub belief: Belief,
     /// L.
     pub labels: Labels,
     /// log w of all of them together; normalised after each step.
@@ -46,12 +51,32 @@ impl Particle {
     pub fn empty(count: u32) -> Self {
         Self {
             edges: Arc::default(),
-            smoother: Smoother::new(),
+            belief: Belief::new(),
             labels: Labels::default(),
             log_weight: 0.0,
             count,
             kept_until: 0,
         }
+    }
+
+    /// Adds an edge to G, and what it says of labels to L; X follows at the next update.
+    pub fn take(&mut self, edge: Edge) {
+        self.belief.hold(edge.factor);
+        if edge.i_from_j.x_m.hypot(edge.i_from_j.y_m) < SAME_PLACE_M {
+            self.labels.carry_over(edge.i, edge.j);
+        }
+        Arc::make_mut(&mut self.edges).push(edge);
+    }
+
+    /// X given G, eq. (10). On an error poses stay where they were, and covariances are unknown.
+    pub fn update(&mut self, structure: &Structure) -> Result<(), SmoothError> {
+        self.belief.update(structure)?;
+        // A loop may move more poses than an update's budget reaches. What is judged next must see
+        // them all where they belong: half of them moved are worse than none.
+        if self.belief.pending() {
+            self.belief.settle(structure)?;
+        }
+        Ok(())
     }
 
     /// w of all of them together.

@@ -10,7 +10,7 @@ use crate::graph::{Graph, Vertex};
 use crate::particle::Particle;
 use crate::random::{Purpose, uniform};
 use crate::scan::front::LOCAL_PATH_M;
-use crate::smoothing::{Relative, Smoother};
+use crate::smoothing::{Belief, Relative, Structure};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -71,13 +71,13 @@ pub fn distance(relative: &Relative) -> (f64, f64) {
 
 /// Whether a place is tied to no older segment: the last place of each is known, seen from it, to no
 /// better than [`LOST_SIGMA_M`].
-pub fn is_lost(graph: &Graph, smoother: &Smoother, t: Vertex) -> bool {
+pub fn is_lost(graph: &Graph, structure: &Structure, belief: &Belief, t: Vertex) -> bool {
     let segment = |v: Vertex| graph.place(v).segment;
     let ends: Vec<Vertex> =
         (0..t).filter(|&i| segment(i) != segment(t) && segment(i) != segment(i + 1)).collect();
     let sigma_m = |r: &Relative| r.covariance[(0, 0)].max(r.covariance[(1, 1)]).sqrt();
     !ends.is_empty()
-        && smoother.relative(t, &ends).is_ok_and(|all| all.iter().all(|r| sigma_m(r) > LOST_SIGMA_M))
+        && belief.relative(structure, t, &ends).is_ok_and(|all| all.iter().all(|r| sigma_m(r) > LOST_SIGMA_M))
 }
 
 /// What equal particles would look at from place `t`: distance edges, semantic edges, and any place
@@ -85,22 +85,23 @@ pub fn is_lost(graph: &Graph, smoother: &Smoother, t: Vertex) -> bool {
 pub fn propose(
     config: &Config,
     graph: &Graph,
+    structure: &Structure,
     particle: &Particle,
     t: Vertex,
     followed: impl Fn(Vertex) -> bool,
 ) -> Vec<Proposal> {
-    let smoother = &particle.smoother;
-    let marginal = smoother.marginal(t);
+    let belief = &particle.belief;
+    let marginal = belief.marginal(structure, t);
     let sigma_m = marginal[(0, 0)].max(marginal[(1, 1)]).sqrt();
     // What is being followed needs no second look; words do get one, wherever they point.
     let older = (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M) && !followed(i));
-    let lost = is_lost(graph, smoother, t);
-    let here = smoother.pose(t);
+    let lost = is_lost(graph, structure, belief, t);
+    let here = belief.pose(t);
     let within_m = NEAR_M + 3.0 * sigma_m.min(LOST_SIGMA_M);
     let near: Vec<Vertex> =
-        older.clone().filter(|&i| !lost && smoother.pose(i).distance_m(&here) < within_m).collect();
-    let mut proposals: Vec<Proposal> = smoother
-        .relative(t, &near)
+        older.clone().filter(|&i| !lost && belief.pose(i).distance_m(&here) < within_m).collect();
+    let mut proposals: Vec<Proposal> = belief
+        .relative(structure, t, &near)
         .unwrap_or_default()
         .iter()
         .map(|r| Proposal {

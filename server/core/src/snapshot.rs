@@ -15,6 +15,7 @@ use crate::query::{
 };
 use crate::resample::effective_sample_size;
 use crate::scan::front::OpenPlace;
+use crate::smoothing::Structure;
 use crate::{Query, query};
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
@@ -34,6 +35,7 @@ const PROBABILITY_MIN: f64 = 0.02;
 pub struct Snapshot {
     places: Vec<Arc<Place>>,
     open: Vec<OpenPlace>,
+    structure: Arc<Structure>,
     particles: Vec<Particle>,
     /// Poses of all places, open ones too, in the best particle's map.
     poses: Vec<Pose2>,
@@ -52,10 +54,10 @@ impl Snapshot {
     ) -> Self {
         let places = filter.graph.places().to_vec();
         let best = filter.best();
-        let mut poses = best.smoother.poses().to_vec();
+        let mut poses = best.belief.poses();
         poses.extend(open_poses(best, &places, &open));
-        let (particles, ledger) = (filter.particles.clone(), filter.ledger.clone());
-        Self { places, open, particles, poses, ledger, robot, epoch, rev }
+        let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
+        Self { places, open, structure, particles, poses, ledger: filter.ledger.clone(), robot, epoch, rev }
     }
 
     /// +1 when the map's coordinates jump.
@@ -247,22 +249,16 @@ impl Snapshot {
     /// Spread of a place over the posterior, best particle's map axes: its own covariance there and
     /// that of its position relative to the robot between particles.
     fn covariance(&self, v: Vertex) -> Matrix3<f64> {
-        let own = |p: &Particle| {
-            let v = v.min((p.smoother.len() as Vertex).saturating_sub(1));
-            if p.smoother.is_empty() {
-                Matrix3::zeros()
-            } else {
-                in_map_axes(&p.smoother.pose(v), &p.smoother.marginal(v))
-            }
-        };
-        let best = &self.particles[0];
-        let mut sum = own(best);
-        let Some(last) = (best.smoother.len() as Vertex).checked_sub(1).filter(|&last| v <= last) else {
+        let best = &self.particles[0].belief;
+        let Some(last) = (best.len() as Vertex).checked_sub(1) else { return Matrix3::zeros() };
+        let known = v.min(last);
+        let mut sum = in_map_axes(&best.pose(known), &best.marginal(&self.structure, known));
+        if v > last {
             return sum;
-        };
-        let here = best.smoother.pose(last);
+        }
+        let here = best.pose(last);
         for p in self.particles.iter().skip(1) {
-            let there = here.compose(&p.smoother.pose(last).between(&p.smoother.pose(v)));
+            let there = here.compose(&p.belief.pose(last).between(&p.belief.pose(v)));
             let (dx, dy) = (there.x_m - self.poses[v as usize].x_m, there.y_m - self.poses[v as usize].y_m);
             let spread = Matrix3::new(dx * dx, dx * dy, 0.0, dx * dy, dy * dy, 0.0, 0.0, 0.0, 0.0);
             sum += p.weight() * spread;

@@ -18,10 +18,8 @@ use crate::particle::{Edge, Particle};
 use crate::propose::{LOST_SIGMA_M, RELOCALISATION_P, distance_probability};
 use crate::random::{Purpose, uniform};
 use crate::scan::correlate::WINDOW_M;
-use crate::smoothing::{Factor, Relative};
-use nalgebra::Matrix3;
+use crate::smoothing::{Factor, Relative, Structure};
 use std::f64::consts::{LN_10, TAU};
-use std::sync::Arc;
 
 /// Share of matched pairs of unrelated places that fit by chance with one place's support.
 const CHANCE_PER_PAIR: f64 = 0.05;
@@ -39,6 +37,9 @@ const CERTAIN: f64 = 1e-4;
 const SHARED_SCANS: f64 = 3.0;
 /// Cap on what one fit may say for or against a particle.
 const LOG_WEIGHT_STEP_MAX: f64 = 4.0 * LN_10;
+/// A loop raises `Σ eᵀ Ω e` by its distance² at most, and none is drawn beyond some hundred: where it
+/// rises by more, Gauss-Newton has lost its way.
+const CHI2_RISE_MAX: f64 = 1000.0;
 /// Places for which the refusal of a fresh semantic edge is kept as an alternative.
 const SIBLING_KEPT: Vertex = 5;
 
@@ -54,8 +55,14 @@ pub struct Judgement {
 }
 
 /// Eq. (18) for both e, and the posterior of e.
-pub fn judge(particle: &Particle, fit: &Fit, t: Vertex, gamma_per_m2: f64) -> Option<Judgement> {
-    let predicted = particle.smoother.relative(t, &[fit.i]).ok()?.into_iter().next()?;
+pub fn judge(
+    structure: &Structure,
+    particle: &Particle,
+    fit: &Fit,
+    t: Vertex,
+    gamma_per_m2: f64,
+) -> Option<Judgement> {
+    let predicted = particle.belief.relative(structure, t, &[fit.i]).ok()?.into_iter().next()?;
     let prior = edge_prior(particle, fit, t, &predicted, gamma_per_m2);
     let innovation = predicted.covariance + fit.mode.covariance;
     let off = predicted.i_from_a.between(&fit.mode.i_from_j).log();
@@ -93,27 +100,30 @@ fn chance_log_density(fit: &Fit) -> f64 {
     (CHANCE_PER_PAIR * CHANCE_PER_SUPPORT.powi(further) / window).ln()
 }
 
-/// What became of a particle and a fit.
+/// What becomes of a particle and a fit.
 pub struct Choice {
-    /// The particle with the edge, if any of its copies took it.
+    /// The particle with the edge, if any of its copies takes it.
     pub taken: Option<Particle>,
-    /// The particle without, if any refused.
+    /// The particle without, if any refuses.
     pub refused: Option<Particle>,
-    /// Why.
-    pub judgement: Judgement,
+    /// All copies without, should the edge not go with the poses of those who take it.
+    undecided: Particle,
 }
 
 /// Draws e for each of the particle's copies and weighs both outcomes. `relief` is the largest
 /// log-evidence any particle has for this fit: weights are relative to it, and none may lose more
-/// than the cap.
+/// than the cap. One without a judgement refuses, and weighs what it did.
 pub fn choose(
     mut particle: Particle,
     fit: &Fit,
-    judgement: Judgement,
+    judgement: Option<Judgement>,
     relief: f64,
     t: Vertex,
     draw: (u64, u64),
 ) -> Choice {
+    let Some(judgement) = judgement else {
+        return Choice { taken: None, refused: Some(particle.clone()), undecided: particle };
+    };
     particle.log_weight += ((judgement.log_evidence - relief) / SHARED_SCANS).max(-LOG_WEIGHT_STEP_MAX);
     let p = judgement.posterior;
     let taking = if p > 1.0 - CERTAIN {
@@ -141,44 +151,47 @@ pub fn choose(
             q
         })
     };
-    let mut taken = part(taking, p);
+    let taken = part(taking, p);
     let mut refused = part(refusing, 1.0 - p);
     if let Some(r) = refused.as_mut().filter(|_| sibling) {
         r.kept_until = t + SIBLING_KEPT;
     }
-    if let Some(q) = taken.as_mut()
-        && !add_edge(q, fit, t)
-    {
-        // The smoother refused the factor: the particle goes on without.
-        taken = None;
-        refused = part(particle.count, 1.0);
-    }
-    Choice { taken, refused, judgement }
+    Choice { taken, refused, undecided: particle }
 }
 
-/// Adds the edge and updates the poses, eq. (10).
-fn add_edge(particle: &mut Particle, fit: &Fit, t: Vertex) -> bool {
+/// Adds the edge of a fit to what all particles share; none of them takes it yet. None if its numbers
+/// are no measurement.
+pub fn add_edge(structure: &mut Structure, fit: &Fit, t: Vertex) -> Option<Edge> {
     let covariance = fit.mode.covariance * SHARED_SCANS;
-    let information = covariance.try_inverse().unwrap_or_else(Matrix3::zeros);
-    let factor = Factor {
-        i: fit.i,
-        j: t,
-        i_from_j: fit.mode.i_from_j,
-        information: (information + information.transpose()) * 0.5,
-    };
-    let mut smoother = particle.smoother.clone();
-    if smoother.add_factor(factor).and_then(|_| smoother.update()).is_err() {
-        return false;
+    let information = covariance.try_inverse()?;
+    let factor = structure
+        .add_factor(Factor {
+            i: fit.i,
+            j: t,
+            i_from_j: fit.mode.i_from_j,
+            information: (information + information.transpose()) * 0.5,
+        })
+        .ok()?;
+    structure.arrange();
+    Some(Edge { i: fit.i, j: t, kind: fit.kind, i_from_j: fit.mode.i_from_j, covariance, factor })
+}
+
+impl Choice {
+    /// Those who take the edge do so; where it does not go with their poses, all copies refuse.
+    pub fn take(&mut self, structure: &Structure, edge: Option<&Edge>) {
+        let Some(taken) = self.taken.take() else { return };
+        self.taken = edge.and_then(|edge| with_edge(taken, structure, edge));
+        if self.taken.is_none() {
+            self.refused = Some(self.undecided.clone());
+        }
     }
-    particle.smoother = smoother;
-    Arc::make_mut(&mut particle.edges).push(Edge {
-        i: fit.i,
-        j: t,
-        kind: fit.kind,
-        i_from_j: fit.mode.i_from_j,
-        covariance,
-    });
-    true
+}
+
+fn with_edge(mut particle: Particle, structure: &Structure, edge: &Edge) -> Option<Particle> {
+    let before = particle.belief.chi2(structure);
+    particle.take(edge.clone());
+    particle.update(structure).ok()?;
+    (particle.belief.chi2(structure) < before + CHI2_RISE_MAX).then_some(particle)
 }
 
 #[cfg(test)]
@@ -186,17 +199,28 @@ mod tests {
     use super::*;
     use crate::geometry::Pose2;
     use crate::scan::matching::Mode;
-    use nalgebra::Vector3;
+    use nalgebra::{Matrix3, Vector3};
 
     /// A chain of n places 1 m apart, straight on, that has drifted by `sigma_m` per place.
-    fn chain(n: u32, sigma_m: f64) -> Particle {
-        let mut p = Particle::empty(10);
+    fn chain(n: u32, sigma_m: f64) -> (Structure, Particle) {
+        let (mut structure, mut p) = (Structure::new(), Particle::empty(10));
         let covariance = Matrix3::from_diagonal(&Vector3::new(sigma_m.powi(2), sigma_m.powi(2), 1e-6));
         let information = covariance.try_inverse().unwrap();
         for _ in 0..n {
-            p.smoother.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
+            structure.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
         }
-        p
+        structure.arrange();
+        p.update(&structure).unwrap();
+        (structure, p)
+    }
+
+    /// What becomes of a chain of 21 and a fit of its two ends.
+    fn decided(fit: &Fit, judgement: Judgement, relief: f64) -> Choice {
+        let (mut structure, p) = chain(21, 0.1);
+        let mut choice = choose(p, fit, Some(judgement), relief, 20, (1, 0));
+        let edge = add_edge(&mut structure, fit, 20);
+        choice.take(&structure, edge.as_ref());
+        choice
     }
 
     fn fit(x_m: f64, score: f64, support: u32) -> Fit {
@@ -207,36 +231,36 @@ mod tests {
 
     #[test]
     fn a_fit_where_it_is_expected_is_taken_and_a_far_one_refused() {
-        let p = chain(21, 0.1);
-        let near = judge(&p, &fit(20.3, 0.95, 4), 20, 0.2).unwrap();
+        let (structure, p) = chain(21, 0.1);
+        let near = judge(&structure, &p, &fit(20.3, 0.95, 4), 20, 0.2).unwrap();
         assert!(near.posterior > 0.99, "{near:?}");
-        let far = judge(&p, &fit(14.0, 0.95, 4), 20, 0.2).unwrap();
+        let far = judge(&structure, &p, &fit(14.0, 0.95, 4), 20, 0.2).unwrap();
         assert!(far.posterior < 1e-6 && far.distance2 > 100.0, "{far:?}");
     }
 
     #[test]
     fn evidence_is_the_marginal_over_both_outcomes() {
-        let p = chain(21, 0.1);
-        let j = judge(&p, &fit(20.4, 0.9, 3), 20, 0.2).unwrap();
+        let (structure, p) = chain(21, 0.1);
+        let j = judge(&structure, &p, &fit(20.4, 0.9, 3), 20, 0.2).unwrap();
         // p(z) p(e=0|z) = p(e=0) p(z|e=0).
         let refused = j.log_evidence + (1.0 - j.posterior).ln();
-        let far = judge(&p, &fit(-40.0, 0.9, 3), 20, 0.2).unwrap();
+        let far = judge(&structure, &p, &fit(-40.0, 0.9, 3), 20, 0.2).unwrap();
         assert!((refused - far.log_evidence).abs() < 1e-6, "{refused} {far:?}");
     }
 
     #[test]
     fn more_support_and_a_better_score_persuade_more() {
-        let p = chain(21, 2.0);
-        let posterior = |score, support| judge(&p, &fit(26.0, score, support), 20, 0.2).unwrap().posterior;
+        let (structure, p) = chain(21, 2.0);
+        let posterior =
+            |score, support| judge(&structure, &p, &fit(26.0, score, support), 20, 0.2).unwrap().posterior;
         assert!(posterior(0.9, 6) > posterior(0.9, 3));
         assert!(posterior(0.95, 3) > posterior(0.8, 3));
     }
 
     #[test]
     fn both_outcomes_share_the_weight_and_the_copies() {
-        let p = chain(21, 0.1);
         let judgement = Judgement { log_evidence: -3.0, posterior: 0.7, distance2: 1.0 };
-        let choice = choose(p, &fit(20.0, 0.9, 3), judgement, -3.0, 20, (1, 0));
+        let choice = decided(&fit(20.0, 0.9, 3), judgement, -3.0);
         let (taken, refused) = (choice.taken.unwrap(), choice.refused.unwrap());
         assert_eq!(taken.count + refused.count, 10);
         assert!((taken.weight() - 0.7).abs() < 1e-12 && (refused.weight() - 0.3).abs() < 1e-12);
@@ -247,7 +271,7 @@ mod tests {
     fn an_unlikely_outcome_keeps_its_exact_share_too() {
         for posterior in [0.01, 0.99] {
             let judgement = Judgement { log_evidence: 0.0, posterior, distance2: 1.0 };
-            let choice = choose(chain(21, 0.1), &fit(20.0, 0.9, 3), judgement, 0.0, 20, (1, 0));
+            let choice = decided(&fit(20.0, 0.9, 3), judgement, 0.0);
             let (taken, refused) = (choice.taken.unwrap(), choice.refused.unwrap());
             assert!((taken.weight() - posterior).abs() < 1e-12);
             assert!((refused.weight() - (1.0 - posterior)).abs() < 1e-12);
@@ -258,11 +282,11 @@ mod tests {
     fn adding_an_edge_that_was_predicted_gains_a_particle_nothing_over_its_twin() {
         // Two equal particles meet the same fit; what one takes must not weigh more than what the
         // prediction of both already said: their sum is the weight before.
-        let p = chain(21, 0.1);
+        let (structure, p) = chain(21, 0.1);
         let f = fit(20.0, 0.95, 5);
-        let judgement = judge(&p, &f, 20, 0.2).unwrap();
+        let judgement = judge(&structure, &p, &f, 20, 0.2).unwrap();
         let before = p.weight();
-        let choice = choose(p, &f, judgement, judgement.log_evidence, 20, (1, 0));
+        let choice = decided(&f, judgement, judgement.log_evidence);
         let after: f64 = [choice.taken, choice.refused].iter().flatten().map(Particle::weight).sum();
         assert!((after - before).abs() < 1e-12);
     }
@@ -270,8 +294,20 @@ mod tests {
     #[test]
     fn no_fit_costs_more_than_the_cap() {
         let judgement = Judgement { log_evidence: -500.0, posterior: 0.0, distance2: 900.0 };
-        let choice = choose(chain(21, 0.1), &fit(14.0, 0.9, 3), judgement, 5.0, 20, (1, 0));
+        let choice = decided(&fit(14.0, 0.9, 3), judgement, 5.0);
         assert!((choice.refused.unwrap().log_weight + LOG_WEIGHT_STEP_MAX).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_edge_that_does_not_go_with_the_poses_is_refused_by_all_copies() {
+        // Taken against all odds: the chain would have to shrink to half its length.
+        let judgement = Judgement { log_evidence: 0.0, posterior: 0.7, distance2: 1.0 };
+        let mut absurd = fit(20.0, 0.9, 3);
+        absurd.mode.i_from_j = Pose2::new(-400.0, 0.0, 3.0);
+        let choice = decided(&absurd, judgement, 0.0);
+        let refused = choice.refused.unwrap();
+        assert!(choice.taken.is_none() && refused.edges.is_empty());
+        assert_eq!((refused.count, refused.weight()), (10, 1.0));
     }
 
     #[test]
@@ -279,7 +315,7 @@ mod tests {
         let judgement = Judgement { log_evidence: 0.0, posterior: 0.999, distance2: 1.0 };
         let mut semantic = fit(20.0, 0.9, 3);
         semantic.kind = EdgeKind::Semantic;
-        let choice = choose(chain(21, 0.1), &semantic, judgement, 0.0, 20, (1, 0));
+        let choice = decided(&semantic, judgement, 0.0);
         let refused = choice.refused.unwrap();
         assert_eq!((refused.count, refused.kept_until), (1, 25));
     }

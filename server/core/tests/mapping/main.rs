@@ -5,6 +5,7 @@ mod world;
 use toponym_core::effects::{EdgeKind, Effect, Effects, HeardStatus, TrackState};
 use toponym_core::event::{Event, Odom, Scan};
 use toponym_core::geometry::Pose2;
+use toponym_core::mapper::SaveError;
 use toponym_core::query::{Answer, Query, WhereAnswer};
 use toponym_core::{Config, Mapper};
 use world::{drive, events, laser, say};
@@ -102,6 +103,15 @@ fn rubbish_is_no_map() {
     assert!(Mapper::load(b"rubbish").is_err());
     let bytes = Mapper::new(Config::default()).save().unwrap();
     assert!(Mapper::load(&bytes[..bytes.len() - 1]).is_err());
+}
+
+#[test]
+fn a_map_of_an_older_format_is_told_from_rubbish() {
+    let mut bytes = Mapper::new(Config::default()).save().unwrap();
+    let number = bytes.iter().position(|b| *b == b'2').unwrap();
+    bytes[number] = b'1';
+    let error = Mapper::load(&bytes).unwrap_err();
+    assert!(matches!(error, SaveError::Format { .. }), "{error}");
 }
 
 #[test]

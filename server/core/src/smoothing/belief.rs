@@ -1,0 +1,227 @@
+//! One particle's Gaussian over its poses: linearisation points, steps from them, and the numbers
+//! of each clique.
+
+use super::chunked::Chunked;
+use super::factor::{At, residual};
+use super::front::Front;
+use super::marginal::Prior;
+use super::structure::Structure;
+use super::tree::{Clique, Entry, NONE, Places, Share};
+use super::{FactorId, SmoothError};
+use crate::geometry::Pose2;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// δ of a pose.
+#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+pub(super) struct Step {
+    /// Metres, metres, radians in the frame of the linearisation point.
+    pub by: [f64; 3],
+    /// Solution in which it last changed.
+    pub moved: u32,
+}
+
+/// One particle's numbers. A clone shares everything with its original until one of them changes.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Belief {
+    /// Linearisation points.
+    pub(super) points: Chunked<At>,
+    pub(super) steps: Chunked<Step>,
+    /// Factors held, a bit each.
+    held: Chunked<u64>,
+    /// By prior's factor.
+    pub(super) priors: Arc<Vec<(FactorId, Arc<Prior>)>>,
+    /// By clique. Not saved: they follow from the rest.
+    #[serde(skip)]
+    pub(super) fronts: Chunked<Option<Arc<Front>>>,
+    /// The structure's arrangement that these are for.
+    pub(super) epoch: u64,
+    /// Number of solutions.
+    pub(super) solution: u32,
+    /// Factors held or let go since the last update.
+    pub(super) changed: Vec<FactorId>,
+    /// Whether poses far from their linearisation points wait for their turn.
+    pub(super) pending: bool,
+    marginalised: usize,
+    /// Cliques below those solved anew whose poses lag, with their serials.
+    pub(super) below: Vec<(u32, u32)>,
+    /// Solution, and arrangement, at which no pose lagged.
+    pub(super) all_solved: u32,
+    pub(super) all_at: u64,
+    /// Whether a pose went far since then.
+    pub(super) far: bool,
+    /// Whether the last update failed, so that the next one has all to do.
+    pub(super) behind: bool,
+}
+
+impl Belief {
+    /// Without poses.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// Holds a factor of the structure from the next update on.
+    pub fn hold(&mut self, id: FactorId) {
+        self.set_held(id, true);
+    }
+
+    /// Lets a factor go from the next update on.
+    pub fn release(&mut self, id: FactorId) {
+        self.set_held(id, false);
+    }
+
+    fn set_held(&mut self, id: FactorId, held: bool) {
+        if self.holds(id) == held {
+            return;
+        }
+        let (word, bit) = (id as usize / 64, id % 64);
+        while self.held.len() <= word {
+            self.held.push(0);
+        }
+        *self.held.make_mut(word) ^= 1 << bit;
+        self.changed.push(id);
+    }
+
+    /// Whether it holds a factor.
+    pub fn holds(&self, id: FactorId) -> bool {
+        self.held.get(id as usize / 64).is_some_and(|word| word >> (id % 64) & 1 == 1)
+    }
+
+    /// Whether some poses wait to be linearised anew: another update would bring it nearer to the
+    /// optimum.
+    pub fn pending(&self) -> bool {
+        self.pending
+    }
+
+    /// What tells each clique's numbers from others: beliefs share those that are equal.
+    pub fn front_ids(&self) -> impl Iterator<Item = usize> {
+        self.fronts.iter().flatten().map(|front| Arc::as_ptr(front) as usize)
+    }
+
+    /// Pose i: origin_from_i; of a marginalised one, as it was last. Indexes like a slice.
+    pub fn pose(&self, i: u32) -> Pose2 {
+        self.points[i as usize].moved(&self.steps[i as usize].by)
+    }
+
+    /// All poses.
+    pub fn poses(&self) -> Vec<Pose2> {
+        self.points.iter().zip(self.steps.iter()).map(|(point, step)| point.moved(&step.by)).collect()
+    }
+
+    /// Number of poses.
+    pub fn len(&self) -> usize {
+        self.points.len()
+    }
+
+    /// Whether there is no pose yet.
+    pub fn is_empty(&self) -> bool {
+        self.points.len() == 0
+    }
+
+    /// The objective at the poses: `Σ eᵀ Ω e` over the factors held.
+    pub fn chi2(&self, structure: &Structure) -> f64 {
+        let cost = |(id, entry): (usize, &Entry)| match entry {
+            Entry::Between(f, _) if self.has(structure, id as FactorId) => {
+                f.cost(self.pose(f.i), self.pose(f.j))
+            }
+            _ => 0.0,
+        };
+        structure.entries.iter().enumerate().map(cost).sum()
+    }
+
+    pub(super) fn has(&self, structure: &Structure, id: FactorId) -> bool {
+        structure.common[id as usize] || self.holds(id)
+    }
+
+    /// New poses begin where the factor says that they were added with.
+    pub(super) fn start_poses(&mut self, structure: &Structure) {
+        for k in self.len()..structure.len() {
+            let pose = match structure.entries.get(structure.starts[k] as usize) {
+                Some(Entry::Between(f, _)) if k > 0 && f.j as usize == k => {
+                    self.pose(f.i).compose(&f.i_from_j)
+                }
+                Some(Entry::Between(f, _)) if k > 0 => self.pose(f.j).compose(&f.i_from_j.inverse()),
+                _ => Pose2::default(),
+            };
+            self.points.push(At::new(pose));
+            self.steps.push(Step::default());
+        }
+    }
+
+    pub(super) fn marginalise(&mut self, structure: &Structure) -> Result<(), SmoothError> {
+        let all = structure.marginalised_before + structure.marginalised.len();
+        if self.marginalised == all {
+            return Ok(());
+        }
+        if self.marginalised < structure.marginalised_before {
+            return Err(SmoothError::Behind);
+        }
+        let from = self.marginalised - structure.marginalised_before;
+        for one in &structure.marginalised[from..] {
+            if let Some((id, poses)) = &one.prior {
+                let prior = Prior::left_by(one, poses, structure, self)?;
+                Arc::make_mut(&mut self.priors).push((*id, Arc::new(prior)));
+            }
+        }
+        self.marginalised = all;
+        // Those of which priors have been made since.
+        let present = |id: FactorId| !matches!(structure.entries[id as usize], Entry::Removed);
+        Arc::make_mut(&mut self.priors).retain(|(id, _)| present(*id));
+        Ok(())
+    }
+
+    /// A clique's front before elimination: its factors and what its children leave. None where sums
+    /// would lose digits.
+    pub(super) fn assembled(&self, structure: &Structure, clique: &Clique) -> Option<Front> {
+        let mut front = Front::new(clique.poses.len(), clique.frontals);
+        for share in &clique.factors {
+            self.add_factor(structure, share, &mut front);
+        }
+        for &child in &clique.children {
+            if let Some(numbers) = &self.fronts[child as usize] {
+                if numbers.root().is_some() {
+                    return None;
+                }
+                front.take_up(numbers, &structure.tree.cliques[child as usize].slots);
+            }
+        }
+        let drowns = |share: &Share| match (&structure.entries[share.id as usize], &share.at) {
+            (Entry::Between(f, _), &Places::Two(i, j)) if self.has(structure, share.id) => {
+                [i, j].into_iter().any(|p| p != NONE && front.drowns(p as usize, &f.information))
+            }
+            _ => false,
+        };
+        (!clique.factors.iter().any(drowns)).then_some(front)
+    }
+
+    fn add_factor(&self, structure: &Structure, share: &Share, front: &mut Front) {
+        match (&structure.entries[share.id as usize], &share.at) {
+            (Entry::Between(f, z), &Places::Two(i, j)) if self.has(structure, share.id) => {
+                let at = |p: u32| &self.points[p as usize];
+                let part = residual(z, at(f.i), at(f.j)).weighted(&f.information);
+                if i != NONE {
+                    front.add(i as usize, i as usize, &part.h_ii);
+                    front.add_rhs(i as usize, &part.b_i);
+                }
+                if j != NONE {
+                    front.add(j as usize, j as usize, &part.h_jj);
+                    front.add_rhs(j as usize, &part.b_j);
+                }
+                if i != NONE && j != NONE {
+                    front.add(i as usize, j as usize, &part.h_ij);
+                }
+            }
+            (Entry::Prior(poses), Places::Many(places)) => {
+                if let Some(prior) = self.prior(share.id) {
+                    prior.add_to(front, poses, places, |p| self.points[p as usize]);
+                }
+            }
+            _ => {}
+        }
+    }
+
+    pub(super) fn prior(&self, id: FactorId) -> Option<&Prior> {
+        let k = self.priors.binary_search_by_key(&id, |(id, _)| *id).ok()?;
+        Some(&self.priors[k].1)
+    }
+}

@@ -1,0 +1,350 @@
+//! A clique's numbers: a dense symmetric front, of which the frontals are eliminated.
+//!
+//! A front holds the lower triangle of its share of Λ, eq. (10), in 3×3 blocks, and its right-hand
+//! side as a last row. Block column J is a panel of three columns, each from the diagonal block's
+//! first row down to the last row, one after the other; panels follow each other. Eliminating the
+//! frontals leaves
+//!
+//! ```text
+//! frontals' panels:   L (diagonal blocks lower triangular), last row (L⁻¹ b)ᵀ
+//! separators' panels: Λ_SS − L_S L_Sᵀ, last row (b_S − L_S L⁻¹ b)ᵀ: what the parent takes up
+//! ```
+
+// Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
+#![allow(clippy::inline_always)]
+
+use super::kernels::{
+    Ill, add_products, back, block_of, dots, eliminate_panel, offset, solve_lower, solve_transposed,
+    subtract_products,
+};
+use faer::{Mat, MatRef};
+use nalgebra::{Matrix3, Vector3};
+use pulp::Arch;
+
+/// Where a pose keeps less than this share of its diagonal, what it keeps is rounding for a good
+/// part: such a front is better eliminated by QR.
+const KEPT_MIN: f64 = 1e-10;
+
+/// Numbers of one clique for one belief.
+#[derive(Clone, Debug)]
+pub(super) struct Front {
+    blocks: usize,
+    frontals: usize,
+    values: Vec<f64>,
+    /// `[R | d]` of what is left on the separators, where `RᵀR` would lose digits of it.
+    root: Option<Box<Mat<f64>>>,
+}
+
+impl Front {
+    /// Zeros.
+    pub fn new(blocks: usize, frontals: usize) -> Self {
+        Self { blocks, frontals, values: vec![0.0; offset(blocks, blocks)], root: None }
+    }
+
+    /// Rows of a panel, the right-hand side's counted.
+    fn height(&self, j: usize) -> usize {
+        3 * (self.blocks - j) + 1
+    }
+
+    fn panel(&self, j: usize) -> &[f64] {
+        &self.values[offset(self.blocks, j)..offset(self.blocks, j + 1)]
+    }
+
+    fn panel_mut(&mut self, j: usize) -> &mut [f64] {
+        let (from, to) = (offset(self.blocks, j), offset(self.blocks, j + 1));
+        &mut self.values[from..to]
+    }
+
+    /// Λ_rc += m, whichever of the two comes first.
+    pub fn add(&mut self, r: usize, c: usize, m: &Matrix3<f64>) {
+        if r < c {
+            self.add_below(c, r, &m.transpose());
+        } else {
+            self.add_below(r, c, m);
+        }
+    }
+
+    fn add_below(&mut self, r: usize, c: usize, m: &Matrix3<f64>) {
+        let height = self.height(c);
+        let panel = self.panel_mut(c);
+        for k in 0..3 {
+            let at = k * height + 3 * (r - c);
+            for (v, m) in panel[at..at + 3].iter_mut().zip(m.column(k).iter()) {
+                *v += m;
+            }
+        }
+    }
+
+    /// b_c += v.
+    pub fn add_rhs(&mut self, c: usize, v: &Vector3<f64>) {
+        let height = self.height(c);
+        let panel = self.panel_mut(c);
+        for k in 0..3 {
+            panel[(k + 1) * height - 1] += v[k];
+        }
+    }
+
+    /// Takes up what an eliminated child leaves, whose separators are at `slots` here.
+    pub fn take_up(&mut self, child: &Self, slots: &[u32]) {
+        Arch::new().dispatch(|| self.take_up_inline(child, slots));
+    }
+
+    #[inline(always)]
+    fn take_up_inline(&mut self, child: &Self, slots: &[u32]) {
+        for (k, &c) in slots.iter().enumerate() {
+            let (source, height) = (child.panel(child.frontals + k), child.height(child.frontals + k));
+            self.take_up_panel(source, height, &slots[k..], c as usize);
+        }
+    }
+
+    #[inline(always)]
+    fn take_up_panel(&mut self, source: &[f64], height: usize, slots: &[u32], c: usize) {
+        let into_height = self.height(c);
+        let mut k = 0;
+        while k < slots.len() {
+            let r = slots[k] as usize;
+            if r < c {
+                // The child's order is older than this front's.
+                let block = |row: usize, col: usize| source[col * height + 3 * k + row];
+                self.add_below(c, r, &Matrix3::from_fn(|a, b| block(b, a)));
+                k += 1;
+                continue;
+            }
+            let run = 1 + slots[k..].windows(2).take_while(|w| w[1] == w[0] + 1).count();
+            let into = self.panel_mut(c);
+            for col in 0..3 {
+                let from = &source[col * height + 3 * k..][..3 * run];
+                let into = &mut into[col * into_height + 3 * (r - c)..][..3 * run];
+                for (v, s) in into.iter_mut().zip(from) {
+                    *v += s;
+                }
+            }
+            k += run;
+        }
+        let into = self.panel_mut(c);
+        for col in 0..3 {
+            into[(col + 1) * into_height - 1] += source[(col + 1) * height - 1];
+        }
+    }
+
+    /// Partial Cholesky of the frontals.
+    pub fn eliminate(&mut self) -> Result<(), Ill> {
+        Arch::new().dispatch(|| self.eliminate_inline())
+    }
+
+    #[inline(always)]
+    fn eliminate_inline(&mut self) -> Result<(), Ill> {
+        let before: Vec<[f64; 3]> = (0..self.blocks).map(|j| self.diagonal(j)).collect();
+        for j in 0..self.frontals {
+            if !self.keeps(j, &before[j]) {
+                return Err(Ill);
+            }
+            let (head, tail) = self.values.split_at_mut(offset(self.blocks, j + 1));
+            let panel = &mut head[offset(self.blocks, j)..];
+            let height = 3 * (self.blocks - j) + 1;
+            eliminate_panel(panel, height)?;
+            let (x0, rest) = panel.split_at(height);
+            let (x1, x2) = rest.split_at(height);
+            let mut tail = tail;
+            for first in (3..height - 1).step_by(3) {
+                let rows = height - first;
+                let (panel, after) = tail.split_at_mut(3 * rows);
+                let x = [&x0[first..], &x1[first..], &x2[first..]];
+                let (p0, rest) = panel.split_at_mut(rows);
+                let (p1, p2) = rest.split_at_mut(rows);
+                // `panel −= x xᵀ`: where the smoother spends its time.
+                subtract_products([p0, p1, p2], x, [0, 1, 2].map(|k| x.map(|x| x[k])), rows);
+                tail = after;
+            }
+        }
+        if (self.frontals..self.blocks).all(|j| self.keeps(j, &before[j])) { Ok(()) } else { Err(Ill) }
+    }
+
+    /// Whether a block's diagonal is more than rounding of what it was.
+    fn keeps(&self, j: usize, before: &[f64; 3]) -> bool {
+        self.diagonal(j).iter().zip(before).all(|(a, b)| *a > KEPT_MIN * b || *b == 0.0)
+    }
+
+    /// Whether so little would be rounding on a block's diagonal.
+    pub fn drowns(&self, j: usize, little: &Matrix3<f64>) -> bool {
+        self.diagonal(j).iter().zip(little.diagonal().iter()).any(|(all, little)| *little < KEPT_MIN * all)
+    }
+
+    /// What is left on the separators, where it has digits that [`Front::left`] lost.
+    pub fn root(&self) -> Option<MatRef<'_, f64>> {
+        self.root.as_deref().map(Mat::as_ref)
+    }
+
+    /// What is left on the separators: `[Λ_SS | b_S]`.
+    pub fn left(&self) -> Mat<f64> {
+        let n = 3 * (self.blocks - self.frontals);
+        let mut left = Mat::zeros(n, n + 1);
+        for c in 0..n {
+            let column = self.columns(self.frontals + c / 3)[c % 3];
+            for r in c..n {
+                left[(r, c)] = column[r - c / 3 * 3];
+                left[(c, r)] = left[(r, c)];
+            }
+            left[(c, n)] = column[column.len() - 1];
+        }
+        left
+    }
+
+    /// From an upper triangular root `[R | d]` of the whole front: `Λ = RᵀR`, `b = Rᵀd`. None where a
+    /// frontal is not held by anything.
+    pub fn from_root(blocks: usize, frontals: usize, root: MatRef<'_, f64>) -> Option<Self> {
+        let mut front = Self::new(blocks, frontals);
+        let (n, f) = (3 * blocks, 3 * frontals);
+        let separators = root.submatrix(f, f, n - f, n - f + 1);
+        let left = separators.subcols(0, n - f).transpose() * separators;
+        for c in 0..n {
+            let height = front.height(c / 3);
+            let panel = front.panel_mut(c / 3);
+            let column = &mut panel[c % 3 * height..(c % 3 + 1) * height];
+            if c >= f {
+                (c / 3 * 3..n).for_each(|r| column[r - c / 3 * 3] = left[(r - f, c - f)]);
+                column[height - 1] = left[(c - f, n - f)];
+                continue;
+            }
+            let pivot = root[(c, c)];
+            if !(pivot.is_finite() && pivot != 0.0) {
+                return None;
+            }
+            (c..n).for_each(|r| column[r - c / 3 * 3] = pivot.signum() * root[(c, r)]);
+            column[height - 1] = pivot.signum() * root[(c, n)];
+        }
+        let lost = |c: usize| {
+            let column = separators.col(c).subrows(0, c + 1);
+            column[c] * column[c] < KEPT_MIN * column.squared_norm_l2()
+        };
+        if (0..n - f).any(lost) {
+            front.root = Some(Box::new(separators.to_owned()));
+        }
+        Some(front)
+    }
+
+    fn diagonal(&self, j: usize) -> [f64; 3] {
+        let (panel, height) = (self.panel(j), self.height(j));
+        [panel[0], panel[height + 1], panel[2 * height + 2]]
+    }
+
+    /// `L_FFᵀ x_F = d − L_Sᵀ x_S`: fills the frontals' part of x, three numbers a block.
+    pub fn solve_back(&self, x: &mut [f64]) {
+        Arch::new().dispatch(|| self.solve_back_inline(x));
+    }
+
+    #[inline(always)]
+    fn solve_back_inline(&self, x: &mut [f64]) {
+        for j in (0..self.frontals).rev() {
+            let columns = self.columns(j);
+            let last = columns[0].len() - 1;
+            let sums = dots(columns.map(|c| &c[3..last]), &x[3 * (j + 1)..3 * self.blocks]);
+            let t = [0, 1, 2].map(|k| columns[k][last] - sums[k]);
+            back(columns, t, &mut x[3 * j..3 * j + 3]);
+        }
+    }
+
+    /// Covariances of the frontals with one another and with the separators, filled into a symmetric
+    /// matrix over the front (column after column) that holds the separators' own; `sums` is scratch.
+    ///
+    /// `x_j = −L_jj⁻ᵀ (Σ_k L_kjᵀ x_k − ε)`, so `Σ_jm = −L_jj⁻ᵀ Σ_k L_kjᵀ Σ_km` and
+    /// `Σ_jj = L_jj⁻ᵀ (I + Σ_km L_kjᵀ Σ_km L_mj) L_jj⁻¹` (Takahashi's recursion).
+    pub fn fill_covariance(&self, sigma: &mut [f64], sums: &mut Vec<f64>, leaf: bool) {
+        let n = 3 * self.blocks;
+        sums.resize(3 * n, 0.0);
+        Arch::new().dispatch(|| {
+            for j in (0..self.frontals).rev() {
+                self.fill_covariance_of(j, sigma, &mut sums[..3 * (n - 3 * (j + 1))], leaf && j == 0);
+            }
+        });
+    }
+
+    #[inline(always)]
+    fn fill_covariance_of(&self, j: usize, sigma: &mut [f64], sums: &mut [f64], own_only: bool) {
+        let n = 3 * self.blocks;
+        let (from, rows) = (3 * (j + 1), n - 3 * (j + 1));
+        let [c0, c1, c2] = self.columns(j);
+        let below = [&c0[3..3 + rows], &c1[3..3 + rows], &c2[3..3 + rows]];
+        // Σ_(>j)(>j) L_(>j)j, three columns.
+        sums.fill(0.0);
+        for k in (0..rows).step_by(3) {
+            let column = |k: usize| &sigma[(from + k) * n + from..][..rows];
+            let l = [0, 1, 2].map(|c| [below[c][k], below[c][k + 1], below[c][k + 2]]);
+            add_products(sums, [column(k), column(k + 1), column(k + 2)], l, rows);
+        }
+        let (s0, rest) = sums.split_at(rows);
+        let (s1, s2) = rest.split_at(rows);
+        let d0 = dots(below, s0);
+        let d1 = dots(below, s1);
+        let d2 = dots(below, s2);
+        let inner =
+            Matrix3::new(1.0 + d0[0], d1[0], d2[0], d1[0], 1.0 + d1[1], d2[1], d2[0], d2[1], 1.0 + d2[2]);
+        let diagonal = block_of([c0, c1, c2], 0);
+        let own = solve_transposed(&diagonal, &solve_transposed(&diagonal, &inner).transpose());
+        for c in 0..3 {
+            sigma[(3 * j + c) * n + 3 * j..][..3].copy_from_slice(own.column(c).as_slice());
+        }
+        if own_only {
+            return;
+        }
+        let (i0, i1, i2) = (1.0 / c0[0], 1.0 / c1[1], 1.0 / c2[2]);
+        for m in 0..rows {
+            let a2 = -s2[m] * i2;
+            let a1 = (-s1[m] - c1[2] * a2) * i1;
+            let a0 = (-s0[m] - c0[1] * a1 - c0[2] * a2) * i0;
+            sigma[(from + m) * n + 3 * j..][..3].copy_from_slice(&[a0, a1, a2]);
+            sigma[3 * j * n + from + m] = a0;
+            sigma[(3 * j + 1) * n + from + m] = a1;
+            sigma[(3 * j + 2) * n + from + m] = a2;
+        }
+    }
+
+    /// `L_FF y = b_F`, `b_S −= L_S y`, for three right-hand sides, column after column: the frontals'
+    /// rows become y.
+    pub fn solve_forward(&self, b: &mut [f64]) {
+        Arch::new().dispatch(|| {
+            let n = 3 * self.blocks;
+            for j in 0..self.frontals {
+                let columns = self.columns(j);
+                let diagonal = block_of(columns, 0);
+                let at = 3 * j;
+                let head = Matrix3::from_fn(|r, c| b[c * n + at + r]);
+                let y = solve_lower(&diagonal, &head);
+                for c in 0..3 {
+                    b[c * n + at..][..3].copy_from_slice(y.column(c).as_slice());
+                }
+                let rows = n - at - 3;
+                let l = columns.map(|c| &c[3..3 + rows]);
+                let (b0, rest) = b.split_at_mut(n);
+                let (b1, b2) = rest.split_at_mut(n);
+                let into = [&mut b0[at + 3..], &mut b1[at + 3..], &mut b2[at + 3..]];
+                let y = [0, 1, 2].map(|c| [y[(0, c)], y[(1, c)], y[(2, c)]]);
+                subtract_products(into, l, y, rows);
+            }
+        });
+    }
+
+    /// `L_FFᵀ x_F = −L_Sᵀ x_S` for three columns, one after the other: fills the frontals' rows.
+    pub fn solve_back_homogeneous(&self, x: &mut [f64]) {
+        let n = 3 * self.blocks;
+        Arch::new().dispatch(|| {
+            for j in (0..self.frontals).rev() {
+                let columns = self.columns(j);
+                let l = columns.map(|c| &c[3..c.len() - 1]);
+                for x in x.chunks_exact_mut(n) {
+                    let sums = dots(l, &x[3 * j + 3..]);
+                    back(columns, sums.map(|s| -s), &mut x[3 * j..3 * j + 3]);
+                }
+            }
+        });
+    }
+
+    /// The columns of a panel.
+    #[inline(always)]
+    fn columns(&self, j: usize) -> [&[f64]; 3] {
+        let (panel, height) = (self.panel(j), self.height(j));
+        let (c0, rest) = panel.split_at(height);
+        let (c1, c2) = rest.split_at(height);
+        [c0, c1, c2]
+    }
+}

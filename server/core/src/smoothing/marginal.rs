@@ -1,0 +1,143 @@
+//! What a marginalised pose leaves: a Gaussian over its neighbours' poses relative to one of them.
+//!
+//! Eliminating pose v from its factors gives `cost(ξ) = ξᵀ H ξ − 2 bᵀ ξ` in small steps ξ of its
+//! neighbours from where they were. Measured from one neighbour r, `ξᵢ = zᵢ⁻¹ · x_r⁻¹xᵢ`, it stays true
+//! when a later loop turns and moves all of them together. With one neighbour beside r it is a
+//! between-factor. r is one that v held well: from one hardly known relative to the others, or not at
+//! all where a particle lacks the factor, the others would seem to bend when they turn together.
+
+use super::factor::{At, residual};
+use super::front::Front;
+use super::structure::{Marginalised, Structure};
+use super::tree::{Entry, NONE};
+use super::{Belief, SmoothError};
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+
+/// Share of the best held neighbour's information with which another will do as the reference.
+const HELD_WELL: f64 = 0.3;
+
+/// A Gaussian over poses relative to one of a list.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub(super) struct Prior {
+    /// r: its place in the list.
+    reference: usize,
+    /// zᵢ of the others.
+    z: Vec<At>,
+    /// H and b, three rows a pose of `z`.
+    h: DMatrix<f64>,
+    b: DVector<f64>,
+}
+
+/// A system over some poses, three rows each.
+struct System {
+    h: DMatrix<f64>,
+    b: DVector<f64>,
+}
+
+impl System {
+    fn zeros(poses: usize) -> Self {
+        Self { h: DMatrix::zeros(3 * poses, 3 * poses), b: DVector::zeros(3 * poses) }
+    }
+
+    /// Adds a system over the poses at `places`.
+    fn add(&mut self, part: &Self, places: &[usize]) {
+        for (a, &r) in places.iter().enumerate() {
+            let mut b = self.b.fixed_rows_mut::<3>(3 * r);
+            b += part.b.fixed_rows::<3>(3 * a);
+            for (k, &c) in places.iter().enumerate() {
+                let mut block = self.h.fixed_view_mut::<3, 3>(3 * r, 3 * c);
+                block += part.h.fixed_view::<3, 3>(3 * a, 3 * k);
+            }
+        }
+    }
+
+    /// Which pose but the first is held well by the first: the earliest of those held not much worse
+    /// than the best. Counted from zero.
+    fn well_held(&self) -> usize {
+        let n = self.b.len();
+        let held = |k: usize| self.h[(k, k)] + self.h[(k + 1, k + 1)];
+        let best = (3..n).step_by(3).map(held).fold(0.0, f64::max);
+        (3..n).step_by(3).position(|k| held(k) >= HELD_WELL * best).unwrap_or(0)
+    }
+}
+
+impl Prior {
+    /// The prior that a pose's factors leave on `poses`, at the belief's estimate.
+    pub fn left_by(
+        one: &Marginalised,
+        poses: &[u32],
+        structure: &Structure,
+        belief: &Belief,
+    ) -> Result<Self, SmoothError> {
+        // In the frame of the pose itself, which loses no digits far from the origin.
+        let own = belief.pose(one.pose);
+        let at = |p: u32| At::new(own.between(&belief.pose(p)));
+        // The pose itself first, then its neighbours.
+        let place = |p: u32| poses.binary_search(&p).map_or(0, |k| k + 1);
+        let mut system = System::zeros(poses.len() + 1);
+        for (id, entry) in one.factors.iter().filter(|(id, _)| belief.has(structure, *id)) {
+            let places: Vec<usize> = entry.poses().map(place).collect();
+            match entry {
+                Entry::Between(f, z) => {
+                    let part = residual(z, &at(f.i), &at(f.j)).weighted(&f.information);
+                    let mut two = System::zeros(2);
+                    two.h.fixed_view_mut::<3, 3>(0, 0).copy_from(&part.h_ii);
+                    two.h.fixed_view_mut::<3, 3>(0, 3).copy_from(&part.h_ij);
+                    two.h.fixed_view_mut::<3, 3>(3, 0).copy_from(&part.h_ij.transpose());
+                    two.h.fixed_view_mut::<3, 3>(3, 3).copy_from(&part.h_jj);
+                    two.b.fixed_rows_mut::<3>(0).copy_from(&part.b_i);
+                    two.b.fixed_rows_mut::<3>(3).copy_from(&part.b_j);
+                    system.add(&two, &places);
+                }
+                Entry::Prior(of) => {
+                    if let Some(prior) = belief.prior(*id) {
+                        system.add(&prior.linearised(of, at), &places);
+                    }
+                }
+                Entry::Removed => {}
+            }
+        }
+        let reference = system.well_held();
+        let rest: Vec<usize> = (0..3 * poses.len()).filter(|k| k / 3 != reference).map(|k| k + 3).collect();
+        let pivot = system.h.fixed_view::<3, 3>(0, 0).into_owned();
+        let inverse = pivot.cholesky().ok_or(SmoothError::Singular)?.inverse();
+        let across = system.h.columns(0, 3).select_rows(&rest);
+        let gain = &across * inverse;
+        let h = system.h.select_rows(&rest).select_columns(&rest) - &gain * across.transpose();
+        let b = system.b.select_rows(&rest) - gain * system.b.rows(0, 3);
+        let from = belief.pose(poses[reference]);
+        let others = poses.iter().enumerate().filter(|(k, _)| *k != reference);
+        let z = others.map(|(_, &p)| At::new(from.between(&belief.pose(p)))).collect();
+        Ok(Self { reference, z, h: (&h + h.transpose()) * 0.5, b })
+    }
+
+    /// H and b of steps of the poses.
+    fn linearised(&self, poses: &[u32], at: impl Fn(u32) -> At) -> System {
+        let n = self.z.len();
+        let reference = at(poses[self.reference]);
+        let mut jacobian = DMatrix::zeros(3 * n, 3 * n + 3);
+        let mut xi = DVector::zeros(3 * n);
+        let others = poses.iter().enumerate().filter(|(place, _)| *place != self.reference);
+        for (k, (z, (place, &p))) in self.z.iter().zip(others).enumerate() {
+            let r = residual(z, &reference, &at(p));
+            jacobian.fixed_view_mut::<3, 3>(3 * k, 3 * self.reference).copy_from(&r.j_i);
+            jacobian.fixed_view_mut::<3, 3>(3 * k, 3 * place).copy_from(&r.j_j);
+            xi.fixed_rows_mut::<3>(3 * k).copy_from(&r.error);
+        }
+        let b = jacobian.tr_mul(&(&self.b - &self.h * xi));
+        System { h: jacobian.tr_mul(&(&self.h * &jacobian)), b }
+    }
+
+    /// Adds its share to a front, at the places of its poses there.
+    pub fn add_to(&self, front: &mut Front, poses: &[u32], places: &[u32], at: impl Fn(u32) -> At) {
+        let system = self.linearised(poses, at);
+        for (a, &r) in places.iter().enumerate().filter(|(_, r)| **r != NONE) {
+            front.add_rhs(r as usize, &system.b.fixed_rows::<3>(3 * a).into_owned());
+            for (k, &c) in places.iter().enumerate().filter(|(_, c)| **c != NONE && **c <= r) {
+                let block = system.h.fixed_view::<3, 3>(3 * a, 3 * k).into_owned();
+                front.add(r as usize, c as usize, &block);
+            }
+        }
+    }
+}
