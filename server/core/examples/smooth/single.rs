@@ -24,7 +24,7 @@ const JOINT_AGE: usize = 50;
 const JOINT_MANY: usize = 20;
 const COPIES: u32 = 200;
 /// Updates at the end at most: each linearises a bounded number of poses anew.
-const CATCH_UP_MAX: u32 = 30;
+const CATCH_UP_MAX: u32 = 300;
 
 /// The line printed; its names are the peers'.
 #[derive(Serialize)]

@@ -48,8 +48,8 @@ pub struct Belief {
     /// Solution, and arrangement, at which no pose lagged.
     pub(super) all_solved: u32,
     pub(super) all_at: u64,
-    /// Whether a pose went far since then.
-    pub(super) far: bool,
+    /// How far a pose went since then, in standard deviations.
+    pub(super) farthest: f64,
     /// Whether the last update failed, so that the next one has all to do.
     pub(super) behind: bool,
 }

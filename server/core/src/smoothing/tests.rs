@@ -1,9 +1,12 @@
 //! The smoother against definitions, dense solutions and itself.
 
+mod batch;
+mod bounds;
 mod deep;
 mod dense;
 mod exact;
 mod particles;
+mod parts;
 mod robust;
 mod saved;
 mod script;

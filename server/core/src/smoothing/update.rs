@@ -42,6 +42,8 @@ const IN_VAIN_MAX: u32 = 5;
 const STILL: f64 = 1e-6;
 /// Arrangements by which poses other than the newest lag at least, before they are looked at.
 const LAG: u64 = 10;
+/// So many times what is urgent does not wait for that.
+const AT_ONCE: f64 = 10.0;
 
 /// What an update did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -121,10 +123,11 @@ impl Belief {
         for _ in 0..ROUNDS_MAX {
             self.eliminate(structure, &dirty, &mut work)?;
             self.solve_top(structure, &dirty, &effort)?;
-            if !(all || self.far && structure.epoch >= self.all_at + LAG) {
+            let late = structure.epoch >= self.all_at + LAG || self.farthest > AT_ONCE * effort.urgent;
+            if !(all || late && self.farthest > effort.urgent) {
                 return Ok(work);
             }
-            self.far = false;
+            self.farthest = 0.0;
             self.solve_below(structure, &effort)?;
             self.all_at = structure.epoch;
             // To go back to if that leads nowhere.
@@ -280,7 +283,7 @@ impl Belief {
             let change = step.iter().zip(old).map(|(new, old)| (new - old).abs()).fold(0.0, f64::max);
             let stiffness = &structure.stiffness[p as usize];
             if change * stiffness.per_m > effort.passed_on {
-                self.far |= farness(&step, stiffness) > effort.urgent;
+                self.farthest = self.farthest.max(farness(&step, stiffness));
                 *self.steps.make_mut(p as usize) = Step { by: step, moved: self.solution };
             }
         }
@@ -309,18 +312,17 @@ impl Belief {
             return dirty;
         }
         for (_, p) in far {
-            if effort.budget == 0 {
+            let held = structure.of_pose[p as usize].iter().filter(|&&id| self.has(structure, id));
+            let cliques: Vec<u32> = held.map(|&id| structure.tree.clique_of_factor[id as usize]).collect();
+            // Where all is spoilt anyway it costs nothing: a long tour moves as a whole or not at all.
+            if effort.budget == 0 && cliques.iter().any(|&c| self.fronts[c as usize].is_some()) {
                 self.pending = true;
-                break;
+                continue;
             }
-            let mut cost = 0;
-            for &id in &structure.of_pose[p as usize] {
-                if self.has(structure, id) {
-                    cost +=
-                        self.spoil_up(structure, structure.tree.clique_of_factor[id as usize], &mut dirty);
-                }
+            for c in cliques {
+                let cost = self.spoil_up(structure, c, &mut dirty);
+                effort.budget = effort.budget.saturating_sub(cost);
             }
-            effort.budget = effort.budget.saturating_sub(cost);
             let step = self.steps[p as usize].by.map(|v| descent.share * v);
             let point = self.points.make_mut(p as usize);
             *point = At::new(point.moved(&step));
