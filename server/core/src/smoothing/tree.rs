@@ -28,7 +28,7 @@ pub(super) struct Clique {
     pub slots: Vec<u32>,
     /// Factors whose poses are all here and whose first eliminated one is a frontal.
     pub factors: Vec<Share>,
-    /// Never reused: tells a belief whether its numbers are for this clique.
+    /// Never reused, as numbers of cliques are: tells a belief whether it is the one that lagged.
     pub serial: u32,
     /// A child's is below its parent's.
     pub rank: u64,
@@ -243,7 +243,6 @@ impl Tree {
     /// Makes the cliques: one per group of columns, children first.
     fn build(&mut self, entries: &[Entry], work: &mut Work) {
         let Work { order, local, poses, factors, orphans, place, group, ends_group, .. } = work;
-        self.fresh.clear();
         for (k, column) in order.columns.iter().enumerate() {
             place[column.pose as usize] = k as u32;
             if group[k] == k as u32 {

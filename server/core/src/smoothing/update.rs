@@ -9,7 +9,8 @@ use super::tree::{Clique, NONE};
 use super::{SmoothError, qr};
 use std::sync::Arc;
 
-/// How hard an update tries. All but the budget in standard deviations of a pose's stiffest factor.
+/// How hard an update tries. Where no unit is given, in standard deviations of a pose's stiffest
+/// factor.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Effort {
     /// A step that changes by less is not passed on to the cliques below until changes add up to that.
@@ -314,7 +315,7 @@ impl Belief {
         for (_, p) in far {
             let held = structure.of_pose[p as usize].iter().filter(|&&id| self.has(structure, id));
             let cliques: Vec<u32> = held.map(|&id| structure.tree.clique_of_factor[id as usize]).collect();
-            // Where all is spoilt anyway it costs nothing: a long tour moves as a whole or not at all.
+            // Where all is spoilt anyway it costs nothing.
             if effort.budget == 0 && cliques.iter().any(|&c| self.fronts[c as usize].is_some()) {
                 self.pending = true;
                 continue;
