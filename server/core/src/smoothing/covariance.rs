@@ -12,6 +12,8 @@
 //! its Y begins and ends.
 
 use super::factor::{sandwich, symmetrised};
+use super::inverse::{Fill, Scratch, filled_len, grow};
+use super::kernels::block_of;
 use super::structure::Structure;
 use super::tree::{Clique, NONE};
 use super::{Belief, SmoothError};
@@ -132,10 +134,10 @@ impl Belief {
         let newest = self.len().saturating_sub(1) as u32;
         self.check(structure, newest)?;
         let tree = &structure.tree;
-        let mut parts: Vec<Option<JointPart>> = vec![None; self.len()];
-        let origin = Matrix3::zeros();
-        parts[0] = Some(JointPart { j: 0, marginal: origin, cross: origin });
-        let mut sums = Vec::new();
+        // The origin's are zero; those of marginalised poses are left out at the end.
+        let zeros = |j: usize| JointPart { j: j as u32, marginal: Matrix3::zeros(), cross: Matrix3::zeros() };
+        let mut others: Vec<JointPart> = (0..self.len()).map(zeros).collect();
+        let mut scratch = Scratch::default();
         let mut spare: Vec<Vec<f64>> = Vec::new();
         let mut stack: Vec<(u32, Rc<Vec<f64>>)> = Vec::new();
         let roots = tree.cliques.iter().enumerate().filter(|(_, c)| c.frontals > 0 && c.parent == NONE);
@@ -146,17 +148,18 @@ impl Belief {
             let n = 3 * clique.poses.len();
             let mut own = spare.pop().unwrap_or_default();
             gather(clique, tree.cliques.get(clique.parent as usize), &above, &mut own);
-            let (sigma, cross) = own.split_at_mut(n * n);
-            front.fill_covariance(sigma, &mut sums, clique.children.is_empty());
-            front.solve_back_homogeneous(cross);
+            let outer = if clique.children.is_empty() { Fill::Diagonal } else { Fill::All };
+            front.fill_covariance(&mut own, &mut scratch, outer);
+            let (sigma, rest) = own.split_at_mut(n * n);
+            let cross = &mut rest[..3 * n];
             if let Some(at) = clique.poses[..clique.frontals].iter().position(|&p| p == newest) {
                 // Its cross-covariances begin here: with those of its own clique.
                 cross.copy_from_slice(&sigma[3 * at * n..][..3 * n]);
             }
             for (k, &j) in clique.poses[..clique.frontals].iter().enumerate() {
-                let marginal = Matrix3::from_fn(|r, c| sigma[(3 * k + c) * n + 3 * k + r]);
-                let cross = Matrix3::from_fn(|r, c| cross[r * n + 3 * k + c]);
-                parts[j as usize] = Some(JointPart { j, marginal, cross });
+                let part = &mut others[j as usize];
+                part.marginal = block_of(columns(sigma, n, 3 * k), 3 * k);
+                part.cross = block_of(columns(cross, n, 0), 3 * k).transpose();
             }
             if let Ok(done) = Rc::try_unwrap(above) {
                 spare.push(done);
@@ -167,8 +170,9 @@ impl Belief {
                 spare.push(leaf);
             }
         }
-        let marginal = parts[newest as usize].as_ref().map_or(origin, |p| p.marginal);
-        Ok(Joint { newest, marginal, others: parts.into_iter().flatten().collect() })
+        let marginal = others[newest as usize].marginal;
+        others.retain(|p| structure.check_pose(p.j).is_ok());
+        Ok(Joint { newest, marginal, others })
     }
 
     fn check(&self, structure: &Structure, pose: u32) -> Result<(), SmoothError> {
@@ -220,12 +224,17 @@ impl Belief {
     }
 }
 
+/// Three columns from column c, of n rows each.
+fn columns(m: &[f64], n: usize, c: usize) -> [&[f64]; 3] {
+    [&m[c * n..][..n], &m[(c + 1) * n..][..n], &m[(c + 2) * n..][..n]]
+}
+
 /// The separators' part of a clique's covariances, from its parent's: a symmetric matrix over the
 /// front, then three columns of cross-covariances with the newest pose.
 fn gather(clique: &Clique, parent: Option<&Clique>, above: &[f64], into: &mut Vec<f64>) {
     let n = 3 * clique.poses.len();
     // What is not written here the front fills in.
-    into.resize(n * n + 3 * n, 0.0);
+    grow(into, filled_len(n));
     let Some(parent) = parent else { return };
     let m = 3 * parent.poses.len();
     let from = 3 * clique.frontals;

@@ -14,12 +14,11 @@
 #![allow(clippy::inline_always)]
 
 use super::kernels::{
-    Ill, add_products, back, block_of, dots, eliminate_panel, offset, solve_lower, solve_transposed,
-    subtract_products,
+    Ill, back, block_of, columns_of, dots, eliminate_panel, offset, rows_of, solve_lower, subtract_products,
+    wide,
 };
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
-use pulp::Arch;
 
 /// Where a pose keeps less than this share of its diagonal, what it keeps is rounding for a good
 /// part: such a front is better eliminated by QR.
@@ -28,8 +27,10 @@ const KEPT_MIN: f64 = 1e-10;
 /// Numbers of one clique for one belief.
 #[derive(Clone, Debug)]
 pub(super) struct Front {
-    blocks: usize,
-    frontals: usize,
+    /// Poses.
+    pub blocks: usize,
+    /// How many of them are eliminated here.
+    pub frontals: usize,
     values: Vec<f64>,
     /// `[R | d]` of what is left on the separators, where `RᵀR` would lose digits of it.
     root: Option<Box<Mat<f64>>>,
@@ -86,7 +87,10 @@ impl Front {
 
     /// Takes up what an eliminated child leaves, whose separators are at `slots` here.
     pub fn take_up(&mut self, child: &Self, slots: &[u32]) {
-        Arch::new().dispatch(|| self.take_up_inline(child, slots));
+        wide(
+            #[inline(always)]
+            || self.take_up_inline(child, slots),
+        );
     }
 
     #[inline(always)]
@@ -129,7 +133,10 @@ impl Front {
 
     /// Partial Cholesky of the frontals.
     pub fn eliminate(&mut self) -> Result<(), Ill> {
-        Arch::new().dispatch(|| self.eliminate_inline())
+        wide(
+            #[inline(always)]
+            || self.eliminate_inline(),
+        )
     }
 
     #[inline(always)]
@@ -153,7 +160,7 @@ impl Front {
                 let (p0, rest) = panel.split_at_mut(rows);
                 let (p1, p2) = rest.split_at_mut(rows);
                 // `panel −= x xᵀ`: where the smoother spends its time.
-                subtract_products([p0, p1, p2], x, [0, 1, 2].map(|k| x.map(|x| x[k])), rows);
+                subtract_products([p0, p1, p2], x, columns_of(&block_of(x, 0).transpose()), rows);
                 tail = after;
             }
         }
@@ -230,7 +237,10 @@ impl Front {
 
     /// `L_FFᵀ x_F = d − L_Sᵀ x_S`: fills the frontals' part of x, three numbers a block.
     pub fn solve_back(&self, x: &mut [f64]) {
-        Arch::new().dispatch(|| self.solve_back_inline(x));
+        wide(
+            #[inline(always)]
+            || self.solve_back_inline(x),
+        );
     }
 
     #[inline(always)]
@@ -238,110 +248,43 @@ impl Front {
         for j in (0..self.frontals).rev() {
             let columns = self.columns(j);
             let last = columns[0].len() - 1;
-            let sums = dots(columns.map(|c| &c[3..last]), &x[3 * (j + 1)..3 * self.blocks]);
-            let t = [0, 1, 2].map(|k| columns[k][last] - sums[k]);
+            let sums = dots(rows_of(columns, 3..last), &x[3 * (j + 1)..3 * self.blocks]);
+            let t = [columns[0][last] - sums[0], columns[1][last] - sums[1], columns[2][last] - sums[2]];
             back(columns, t, &mut x[3 * j..3 * j + 3]);
-        }
-    }
-
-    /// Covariances of the frontals with one another and with the separators, filled into a symmetric
-    /// matrix over the front (column after column) that holds the separators' own; `sums` is scratch.
-    ///
-    /// `x_j = −L_jj⁻ᵀ (Σ_k L_kjᵀ x_k − ε)`, so `Σ_jm = −L_jj⁻ᵀ Σ_k L_kjᵀ Σ_km` and
-    /// `Σ_jj = L_jj⁻ᵀ (I + Σ_km L_kjᵀ Σ_km L_mj) L_jj⁻¹` (Takahashi's recursion).
-    pub fn fill_covariance(&self, sigma: &mut [f64], sums: &mut Vec<f64>, leaf: bool) {
-        let n = 3 * self.blocks;
-        sums.resize(3 * n, 0.0);
-        Arch::new().dispatch(|| {
-            for j in (0..self.frontals).rev() {
-                self.fill_covariance_of(j, sigma, &mut sums[..3 * (n - 3 * (j + 1))], leaf && j == 0);
-            }
-        });
-    }
-
-    #[inline(always)]
-    fn fill_covariance_of(&self, j: usize, sigma: &mut [f64], sums: &mut [f64], own_only: bool) {
-        let n = 3 * self.blocks;
-        let (from, rows) = (3 * (j + 1), n - 3 * (j + 1));
-        let [c0, c1, c2] = self.columns(j);
-        let below = [&c0[3..3 + rows], &c1[3..3 + rows], &c2[3..3 + rows]];
-        // Σ_(>j)(>j) L_(>j)j, three columns.
-        sums.fill(0.0);
-        for k in (0..rows).step_by(3) {
-            let column = |k: usize| &sigma[(from + k) * n + from..][..rows];
-            let l = [0, 1, 2].map(|c| [below[c][k], below[c][k + 1], below[c][k + 2]]);
-            add_products(sums, [column(k), column(k + 1), column(k + 2)], l, rows);
-        }
-        let (s0, rest) = sums.split_at(rows);
-        let (s1, s2) = rest.split_at(rows);
-        let d0 = dots(below, s0);
-        let d1 = dots(below, s1);
-        let d2 = dots(below, s2);
-        let inner =
-            Matrix3::new(1.0 + d0[0], d1[0], d2[0], d1[0], 1.0 + d1[1], d2[1], d2[0], d2[1], 1.0 + d2[2]);
-        let diagonal = block_of([c0, c1, c2], 0);
-        let own = solve_transposed(&diagonal, &solve_transposed(&diagonal, &inner).transpose());
-        for c in 0..3 {
-            sigma[(3 * j + c) * n + 3 * j..][..3].copy_from_slice(own.column(c).as_slice());
-        }
-        if own_only {
-            return;
-        }
-        let (i0, i1, i2) = (1.0 / c0[0], 1.0 / c1[1], 1.0 / c2[2]);
-        for m in 0..rows {
-            let a2 = -s2[m] * i2;
-            let a1 = (-s1[m] - c1[2] * a2) * i1;
-            let a0 = (-s0[m] - c0[1] * a1 - c0[2] * a2) * i0;
-            sigma[(from + m) * n + 3 * j..][..3].copy_from_slice(&[a0, a1, a2]);
-            sigma[3 * j * n + from + m] = a0;
-            sigma[(3 * j + 1) * n + from + m] = a1;
-            sigma[(3 * j + 2) * n + from + m] = a2;
         }
     }
 
     /// `L_FF y = b_F`, `b_S −= L_S y`, for three right-hand sides, column after column: the frontals'
     /// rows become y.
     pub fn solve_forward(&self, b: &mut [f64]) {
-        Arch::new().dispatch(|| {
-            let n = 3 * self.blocks;
-            for j in 0..self.frontals {
-                let columns = self.columns(j);
-                let diagonal = block_of(columns, 0);
-                let at = 3 * j;
-                let head = Matrix3::from_fn(|r, c| b[c * n + at + r]);
-                let y = solve_lower(&diagonal, &head);
-                for c in 0..3 {
-                    b[c * n + at..][..3].copy_from_slice(y.column(c).as_slice());
+        wide(
+            #[inline(always)]
+            || {
+                let n = 3 * self.blocks;
+                for j in 0..self.frontals {
+                    let columns = self.columns(j);
+                    let diagonal = block_of(columns, 0);
+                    let at = 3 * j;
+                    let head = Matrix3::from_fn(|r, c| b[c * n + at + r]);
+                    let y = solve_lower(&diagonal, &head);
+                    for c in 0..3 {
+                        b[c * n + at..][..3].copy_from_slice(y.column(c).as_slice());
+                    }
+                    let rows = n - at - 3;
+                    let l = rows_of(columns, 3..3 + rows);
+                    let (b0, rest) = b.split_at_mut(n);
+                    let (b1, b2) = rest.split_at_mut(n);
+                    let into = [&mut b0[at + 3..], &mut b1[at + 3..], &mut b2[at + 3..]];
+                    let y = columns_of(&y);
+                    subtract_products(into, l, y, rows);
                 }
-                let rows = n - at - 3;
-                let l = columns.map(|c| &c[3..3 + rows]);
-                let (b0, rest) = b.split_at_mut(n);
-                let (b1, b2) = rest.split_at_mut(n);
-                let into = [&mut b0[at + 3..], &mut b1[at + 3..], &mut b2[at + 3..]];
-                let y = [0, 1, 2].map(|c| [y[(0, c)], y[(1, c)], y[(2, c)]]);
-                subtract_products(into, l, y, rows);
-            }
-        });
-    }
-
-    /// `L_FFᵀ x_F = −L_Sᵀ x_S` for three columns, one after the other: fills the frontals' rows.
-    pub fn solve_back_homogeneous(&self, x: &mut [f64]) {
-        let n = 3 * self.blocks;
-        Arch::new().dispatch(|| {
-            for j in (0..self.frontals).rev() {
-                let columns = self.columns(j);
-                let l = columns.map(|c| &c[3..c.len() - 1]);
-                for x in x.chunks_exact_mut(n) {
-                    let sums = dots(l, &x[3 * j + 3..]);
-                    back(columns, sums.map(|s| -s), &mut x[3 * j..3 * j + 3]);
-                }
-            }
-        });
+            },
+        );
     }
 
     /// The columns of a panel.
     #[inline(always)]
-    fn columns(&self, j: usize) -> [&[f64]; 3] {
+    pub fn columns(&self, j: usize) -> [&[f64]; 3] {
         let (panel, height) = (self.panel(j), self.height(j));
         let (c0, rest) = panel.split_at(height);
         let (c1, c2) = rest.split_at(height);

@@ -1,12 +1,16 @@
 //! The loops where the smoother spends its time, over panels of three columns.
 //!
 //! Always inlined, into functions that run with the widest registers that the processor has. No sum
-//! is reordered by that: the same bits come out on every machine.
+//! is reordered by that, and products are added with one rounding everywhere (in software, slowly,
+//! where the processor can't): the same bits come out on every machine. Iterators' closures and
+//! `array::map` are calls to code that is not wide: loops are written out.
 
 // Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
 #![allow(clippy::inline_always)]
 
 use nalgebra::Matrix3;
+use pulp::{Arch, Simd, WithSimd};
+use std::ops::Range;
 
 /// A pivot that keeps less than this share of its diagonal has lost all digits.
 const PIVOT_MIN: f64 = 1e-14;
@@ -14,10 +18,41 @@ const PIVOT_MIN: f64 = 1e-14;
 #[derive(Debug)]
 pub(super) struct Ill;
 
+struct Wide<F>(F);
+
+// A closure given to `dispatch` as it is runs behind a shim that is not inlined, in the registers that
+// every processor has.
+impl<R, F: FnMut() -> R> WithSimd for Wide<F> {
+    type Output = R;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(mut self, _: S) -> R {
+        (self.0)()
+    }
+}
+
+/// Runs an `#[inline(always)]` closure in the widest registers that the processor has.
+#[inline(always)]
+pub(super) fn wide<R>(work: impl FnMut() -> R) -> R {
+    Arch::new().dispatch(Wide(work))
+}
+
 /// The block of a panel that begins at a row.
 #[inline(always)]
 pub(super) fn block_of([a, b, c]: [&[f64]; 3], at: usize) -> Matrix3<f64> {
     Matrix3::new(a[at], b[at], c[at], a[at + 1], b[at + 1], c[at + 1], a[at + 2], b[at + 2], c[at + 2])
+}
+
+/// Columns of a block.
+#[inline(always)]
+pub(super) fn columns_of(m: &Matrix3<f64>) -> [[f64; 3]; 3] {
+    [[m.m11, m.m21, m.m31], [m.m12, m.m22, m.m32], [m.m13, m.m23, m.m33]]
+}
+
+/// The same rows of three columns.
+#[inline(always)]
+pub(super) fn rows_of([a, b, c]: [&[f64]; 3], rows: Range<usize>) -> [&[f64]; 3] {
+    [&a[rows.clone()], &b[rows.clone()], &c[rows]]
 }
 
 /// `x = L_jj⁻ᵀ t`, of a panel's diagonal block.
@@ -43,45 +78,17 @@ pub(super) fn solve_lower(l: &Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
     x
 }
 
-/// `L⁻ᵀ m` of a lower triangular block.
-#[inline(always)]
-pub(super) fn solve_transposed(l: &Matrix3<f64>, m: &Matrix3<f64>) -> Matrix3<f64> {
-    let (i0, i1, i2) = (1.0 / l[(0, 0)], 1.0 / l[(1, 1)], 1.0 / l[(2, 2)]);
-    let mut x = Matrix3::zeros();
-    for c in 0..3 {
-        let x2 = m[(2, c)] * i2;
-        let x1 = (m[(1, c)] - x2 * l[(2, 1)]) * i1;
-        let x0 = (m[(0, c)] - x1 * l[(1, 0)] - x2 * l[(2, 0)]) * i0;
-        (x[(0, c)], x[(1, c)], x[(2, c)]) = (x0, x1, x2);
-    }
-    x
-}
-
-/// `sums_c += Σ_k l_ck columns_k`, for three sums one after the other.
-#[inline(always)]
-pub(super) fn add_products(sums: &mut [f64], columns: [&[f64]; 3], l: [[f64; 3]; 3], rows: usize) {
-    let (s0, rest) = sums.split_at_mut(rows);
-    let (s1, s2) = rest.split_at_mut(rows);
-    let [x0, x1, x2] = columns.map(|x| &x[..rows]);
-    let s2 = &mut s2[..rows];
-    for i in 0..rows {
-        let (u, v, w) = (x0[i], x1[i], x2[i]);
-        s0[i] += u * l[0][0] + v * l[0][1] + w * l[0][2];
-        s1[i] += u * l[1][0] + v * l[1][1] + w * l[1][2];
-        s2[i] += u * l[2][0] + v * l[2][1] + w * l[2][2];
-    }
-}
-
 /// `into_c −= Σ_k y_ck columns_k`.
 #[inline(always)]
 pub(super) fn subtract_products(into: [&mut [f64]; 3], columns: [&[f64]; 3], y: [[f64; 3]; 3], rows: usize) {
-    let [p0, p1, p2] = into.map(|p| &mut p[..rows]);
-    let [x0, x1, x2] = columns.map(|x| &x[..rows]);
+    let [p0, p1, p2] = into;
+    let (p0, p1, p2) = (&mut p0[..rows], &mut p1[..rows], &mut p2[..rows]);
+    let [x0, x1, x2] = rows_of(columns, 0..rows);
     for i in 0..rows {
         let (u, v, w) = (x0[i], x1[i], x2[i]);
-        p0[i] -= u * y[0][0] + v * y[0][1] + w * y[0][2];
-        p1[i] -= u * y[1][0] + v * y[1][1] + w * y[1][2];
-        p2[i] -= u * y[2][0] + v * y[2][1] + w * y[2][2];
+        p0[i] = w.mul_add(-y[0][2], v.mul_add(-y[0][1], u.mul_add(-y[0][0], p0[i])));
+        p1[i] = w.mul_add(-y[1][2], v.mul_add(-y[1][1], u.mul_add(-y[1][0], p1[i])));
+        p2[i] = w.mul_add(-y[2][2], v.mul_add(-y[2][1], u.mul_add(-y[2][0], p2[i])));
     }
 }
 
@@ -123,19 +130,20 @@ pub(super) fn eliminate_panel(panel: &mut [f64], height: usize) -> Result<(), Il
 pub(super) fn dots(columns: [&[f64]; 3], x: &[f64]) -> [f64; 3] {
     let mut sums = [[0.0; 4]; 3];
     let whole = x.len() / 4 * 4;
-    let chunks = columns.map(|c| c[..whole].chunks_exact(4));
-    let [a, b, c] = chunks;
+    let [a, b, c] = rows_of(columns, 0..whole);
+    let (a, b, c) = (a.chunks_exact(4), b.chunks_exact(4), c.chunks_exact(4));
     for (((a, b), c), x) in a.zip(b).zip(c).zip(x.chunks_exact(4)) {
         for l in 0..4 {
-            sums[0][l] += a[l] * x[l];
-            sums[1][l] += b[l] * x[l];
-            sums[2][l] += c[l] * x[l];
+            sums[0][l] = a[l].mul_add(x[l], sums[0][l]);
+            sums[1][l] = b[l].mul_add(x[l], sums[1][l]);
+            sums[2][l] = c[l].mul_add(x[l], sums[2][l]);
         }
     }
     for i in whole..x.len() {
         for (sum, column) in sums.iter_mut().zip(columns) {
-            sum[0] += column[i] * x[i];
+            sum[0] = column[i].mul_add(x[i], sum[0]);
         }
     }
-    sums.map(|s| (s[0] + s[1]) + (s[2] + s[3]))
+    let total = |s: [f64; 4]| (s[0] + s[1]) + (s[2] + s[3]);
+    [total(sums[0]), total(sums[1]), total(sums[2])]
 }

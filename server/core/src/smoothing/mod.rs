@@ -23,7 +23,7 @@
 //! | cliques | who is eliminated with whom, given whom | [`tree`], in the [`order`] of least fill |
 //! | L, η | a clique's share of them, for one particle | [`front`]; by QR where digits are few: [`qr`] |
 //! | x̄, δ | linearisation points and steps of one particle | [`belief`], brought up to date in [`update`] |
-//! | Σ_jj, Σ_tj | covariances | [`covariance`] |
+//! | Σ_jj, Σ_tj | covariances | [`covariance`]; of all poses by the selected [`inverse`] |
 //! | p(X \ x_v) | what a marginalised pose leaves | [`marginal`] |
 //!
 //! What all particles share is the [`Structure`]; a [`Belief`] is one particle's numbers, in chunks
@@ -40,6 +40,7 @@ mod chunked;
 mod covariance;
 mod factor;
 mod front;
+mod inverse;
 mod kernels;
 mod marginal;
 mod order;
