@@ -14,6 +14,10 @@ pub struct Config {
     pub language: bool,
     /// Whether names propose edges, eqs. (8–9).
     pub semantic_edges: bool,
+    /// Whether older places are looked at at all: without, the map is the front end's.
+    pub loops: bool,
+    /// Share of the matched loop transforms that are replaced by random ones, to try the filter.
+    pub inject_loops: f64,
     /// Path between successive places.
     pub place_spacing_m: f64,
     /// γ of eq. (6).
@@ -29,6 +33,8 @@ impl Default for Config {
             seed: 1,
             language: true,
             semantic_edges: true,
+            loops: true,
+            inject_loops: 0.0,
             place_spacing_m: 1.0,
             gamma_per_m2: 0.2,
             resample_below: 0.5,

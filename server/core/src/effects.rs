@@ -66,6 +66,17 @@ pub struct Heard {
     pub words: String,
 }
 
+/// An older place that was looked at.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Proposed {
+    /// The older place.
+    pub i: PlaceId,
+    /// By which distribution.
+    pub kind: EdgeKind,
+    /// Its probability there, of the particle that gives most.
+    pub probability: f64,
+}
+
 /// One consequence of an event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Effect {
@@ -135,6 +146,19 @@ pub enum Effect {
     },
     /// A sentence was dealt with.
     Heard(Heard),
+    /// A place is in the graph of every particle: the last effect of its step.
+    Weighed {
+        /// The place.
+        place: PlaceId,
+        /// Stamp of its first scan.
+        stamp_ns: StampNs,
+        /// The older places that were looked at.
+        proposed: Vec<Proposed>,
+        /// Copies and weight of each distinct graph, best first; weights sum to one.
+        weights: Vec<(u32, f64)>,
+        /// Effective sample size, before any resampling.
+        effective_sample_size: f64,
+    },
     /// Particles were resampled.
     Resampled {
         /// Effective sample size before.

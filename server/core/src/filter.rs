@@ -4,9 +4,10 @@
 //! p(L | X, G, z, u, λ) · p(X | G, z, u, λ) · p(G | z, u, λ), eq. (2).
 
 use crate::config::Config;
-use crate::effects::{Effect, Effects};
+use crate::effects::{Effect, Effects, Proposed};
 use crate::geometry::Pose2;
 use crate::graph::{Graph, Vertex};
+use crate::inject::inject;
 use crate::listen::Ledger;
 use crate::loops::{Fit, Loops, Measured};
 use crate::particle::Particle;
@@ -59,8 +60,9 @@ impl Filter {
         let chain = frozen.open.chain;
         let t = self.graph.add(frozen); // v_t
         self.extend(&chain); // its edge to v_{t-1}
-        let proposals = self.propose(t); // 1. edges e_tj, (5–9)
-        let measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
+        let proposals = if self.config.loops { self.propose(t) } else { Vec::new() }; // 1. edges e_tj, (5–9)
+        let mut measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
+        inject(&self.config, t, &mut measured.fits);
         let mut effects = refusals(t, &measured);
         for fit in &measured.fits {
             effects.push(self.take_or_refuse(t, fit)); // 1, 2 and 4: G, X and w, (10), (17–18)
@@ -74,7 +76,19 @@ impl Filter {
             effects.push(Effect::Resampled { effective_sample_size: size });
         }
         self.forget();
+        effects.push(self.weighed(t, &proposals, size));
         effects
+    }
+
+    fn weighed(&self, t: Vertex, proposals: &[Proposal], effective_sample_size: f64) -> Effect {
+        let told = |p: &Proposal| Proposed { i: p.i.into(), kind: p.kind, probability: p.probability };
+        Effect::Weighed {
+            place: t.into(),
+            stamp_ns: self.graph.place(t).stamp_ns,
+            proposed: proposals.iter().map(told).collect(),
+            weights: self.particles.iter().map(|p| (p.count, p.weight())).collect(),
+            effective_sample_size,
+        }
     }
 
     /// The best particle.

@@ -19,6 +19,7 @@ pub mod filter;
 pub mod geometry;
 pub mod graph;
 pub mod grid;
+pub mod inject;
 pub mod labels;
 pub mod language;
 pub mod listen;

@@ -13,6 +13,8 @@ pub enum Purpose {
     Edge,
     /// Which particles survive.
     Resample,
+    /// Which measurements are replaced by random ones, and by which.
+    Inject,
 }
 
 /// A generator for one decision: `who` is a place, a particle or a pair.

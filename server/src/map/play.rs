@@ -1,5 +1,6 @@
 //! Plays a log through a mapper and keeps what the report and the trajectory need of it.
 
+use super::history::History;
 use super::timing::{Stage, Stopwatch};
 use crate::convert;
 use std::collections::{BTreeMap, VecDeque};
@@ -31,6 +32,8 @@ pub struct Played {
     pub scans_dropped: BTreeMap<String, u64>,
     /// Why odometry segments began, and when.
     pub segments: Vec<(i64, String)>,
+    /// Where the history goes, if it is asked for.
+    pub history: Option<History>,
     /// How long things took.
     pub stopwatch: Stopwatch,
     /// Smallest and largest stamp, nanoseconds.
@@ -51,6 +54,7 @@ impl Played {
             scans_placed: 0,
             scans_dropped: BTreeMap::new(),
             segments: Vec::new(),
+            history: None,
             stopwatch: Stopwatch::default(),
             stamps_ns: None,
             hash: Fnv::default(),
@@ -100,6 +104,9 @@ impl Played {
     }
 
     fn keep(&mut self, effect: Effect) {
+        if let Some(history) = &mut self.history {
+            history.note(&effect);
+        }
         match effect {
             Effect::ScanPlaced { stamp_ns, place, place_from_body, odom_from_body, .. } => {
                 self.scans_placed += 1;

@@ -3,12 +3,28 @@
 use std::fmt::Write as _;
 use toponym_core::Pose2;
 
-/// One line per row: `t x y theta`, the stamp as the log wrote it, metres and radians in the map.
-pub fn text(stamps: &[String], poses: &[Pose2]) -> String {
+/// How a pose is written.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Format {
+    /// `t x y theta`
+    #[default]
+    Plain,
+    /// `t x y z qx qy qz qw`, as evo and the TUM benchmark read it
+    Tum,
+}
+
+/// One line per row, the stamp as the log wrote it, metres and radians in the map.
+pub fn text(format: Format, stamps: &[String], poses: &[Pose2]) -> String {
     let mut text = String::with_capacity(poses.len() * 48);
     for (stamp, p) in stamps.iter().zip(poses) {
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{stamp} {:.6} {:.6} {:.6}", p.x_m, p.y_m, p.yaw_rad);
+        let _ = match format {
+            Format::Plain => writeln!(text, "{stamp} {:.6} {:.6} {:.6}", p.x_m, p.y_m, p.yaw_rad),
+            Format::Tum => {
+                let (qz, qw) = (p.yaw_rad / 2.0).sin_cos();
+                writeln!(text, "{stamp} {:.6} {:.6} 0 0 0 {qz:.8} {qw:.8}", p.x_m, p.y_m)
+            }
+        };
     }
     text
 }
@@ -34,8 +50,9 @@ mod tests {
 
     #[test]
     fn rows_keep_the_stamps_text() {
-        let rows = text(&["976052857.3375460".into()], &[Pose2::new(1.0, -2.5, 0.25)]);
-        assert_eq!(rows, "976052857.3375460 1.000000 -2.500000 0.250000\n");
+        let rows = |format| text(format, &["976052857.3375460".into()], &[Pose2::new(1.0, -2.5, 0.25)]);
+        assert_eq!(rows(Format::Plain), "976052857.3375460 1.000000 -2.500000 0.250000\n");
+        assert_eq!(rows(Format::Tum), "976052857.3375460 1.000000 -2.500000 0 0 0 0.12467473 0.99219767\n");
     }
 
     #[test]

@@ -174,7 +174,7 @@ impl Mapping {
             Effect::SegmentBegan { stamp_ns, reason } => warn!(map, stamp_ns, "new segment: {reason}"),
             Effect::EdgeRefused { reason, .. } => debug!(map, "{reason}"),
             Effect::Resampled { effective_sample_size } => debug!(map, effective_sample_size, "resampled"),
-            Effect::PlaceBegan { .. } | Effect::ScanPlaced { .. } => {}
+            Effect::PlaceBegan { .. } | Effect::ScanPlaced { .. } | Effect::Weighed { .. } => {}
         }
     }
 

@@ -1,0 +1,110 @@
+//! Options of `map`.
+
+use super::trajectory::Format;
+use anyhow::{Result, bail};
+use std::path::{Path, PathBuf};
+use toponym_core::Config;
+
+/// Map a recorded log and answer questions about it.
+#[derive(Clone, Debug, clap::Args)]
+#[command(after_help = "Example:\n  toponym-server map tour.clf.gz --narration tour.jsonl \\\n    \
+    --ask \"where is the kitchen\" --trajectory tour.txt --image tour.png")]
+pub struct MapArgs {
+    /// CARMEN log or a file that `serve --record` wrote, gzipped or not
+    pub log: PathBuf,
+    /// Sentences: one {"t": seconds, "text": "this is the gym"} a line
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub narration: Option<PathBuf>,
+    /// Particles
+    #[arg(long, value_name = "N", conflicts_with = "start_map", value_parser = clap::value_parser!(u32).range(1..=10_000))]
+    pub particles: Option<u32>,
+    /// Seed of every random draw
+    #[arg(long, value_name = "S", conflicts_with = "start_map")]
+    pub seed: Option<u64>,
+    /// Threads; the result does not depend on them [default: one per core]
+    #[arg(long, value_name = "N")]
+    pub threads: Option<usize>,
+    /// Do not listen to sentences
+    #[arg(long, conflicts_with = "start_map")]
+    pub no_language: bool,
+    /// Names propose no loop edges
+    #[arg(long, conflicts_with = "start_map")]
+    pub no_semantic_edges: bool,
+    /// Look at no older places: the front end alone, which drifts
+    #[arg(long, conflicts_with = "start_map")]
+    pub no_loops: bool,
+    /// Replace this share of the matched loop transforms by random ones, to see the map survive it
+    #[arg(long, value_name = "FRACTION", conflicts_with = "start_map", value_parser = share)]
+    pub inject_loops: Option<f64>,
+    /// Ask the finished map; may be given many times
+    #[arg(long, value_name = "QUESTION")]
+    pub ask: Vec<String>,
+    /// Write the robot's pose at every odometry line of the log
+    #[arg(long, value_name = "FILE")]
+    pub trajectory: Option<PathBuf>,
+    /// How --trajectory is written
+    #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
+    pub trajectory_format: Format,
+    /// Write a line of JSON per place: what was looked at, edges taken and refused and why, weights
+    #[arg(long, value_name = "FILE.jsonl")]
+    pub history: Option<PathBuf>,
+    /// Write places, graphs, answers, sentences and timing
+    #[arg(long, value_name = "FILE.json")]
+    pub report: Option<PathBuf>,
+    /// Write the map, to go on from with --start-map
+    #[arg(long, value_name = "FILE")]
+    pub save_map: Option<PathBuf>,
+    /// Go on from a saved map; its settings come with it
+    #[arg(long, value_name = "FILE")]
+    pub start_map: Option<PathBuf>,
+    /// Draw grid, trajectory, edges and names
+    #[arg(long, value_name = "FILE.png")]
+    pub image: Option<PathBuf>,
+}
+
+impl MapArgs {
+    /// The files to write, by option.
+    pub fn outputs(&self) -> [(&'static str, Option<&PathBuf>); 5] {
+        [
+            ("--trajectory", self.trajectory.as_ref()),
+            ("--history", self.history.as_ref()),
+            ("--report", self.report.as_ref()),
+            ("--save-map", self.save_map.as_ref()),
+            ("--image", self.image.as_ref()),
+        ]
+    }
+
+    /// The mapper's settings.
+    pub fn config(&self) -> Config {
+        let defaults = Config::default();
+        Config {
+            particles: self.particles.unwrap_or(defaults.particles),
+            seed: self.seed.unwrap_or(defaults.seed),
+            language: !self.no_language,
+            semantic_edges: !self.no_semantic_edges,
+            loops: !self.no_loops,
+            inject_loops: self.inject_loops.unwrap_or(defaults.inject_loops),
+            ..defaults
+        }
+    }
+
+    /// A run may take minutes: a folder that is not there must not be found out afterwards.
+    pub fn check(&self) -> Result<()> {
+        for (option, file) in self.outputs() {
+            let Some(file) = file else { continue };
+            let folder = file.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            if !folder.is_dir() {
+                bail!("{option} {}: there is no folder {}; make it first", file.display(), folder.display());
+            }
+            if file.is_dir() {
+                bail!("{option} {}: this is a folder; give a file's name", file.display());
+            }
+        }
+        Ok(())
+    }
+}
+
+/// A number from 0 to 1.
+fn share(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|s| (0.0..=1.0).contains(s)).ok_or_else(|| "give a share from 0 to 1".into())
+}
