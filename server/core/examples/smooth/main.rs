@@ -22,6 +22,10 @@ use g2o::Graph;
 use std::path::PathBuf;
 use std::process::ExitCode;
 
+/// As in the server.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 const MORE: &str = "\
 Examples (smooth is: cargo run --release -p toponym-core --example smooth --):
   smooth m3500.g2o.gz                              one estimate, one update a pose
