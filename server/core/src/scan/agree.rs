@@ -39,26 +39,39 @@ impl Agreement {
 /// Compares both ways.
 pub fn agreement(a: &Content, b: &Content, a_from_b: &Pose2) -> Agreement {
     let mut sum = Agreement::default();
-    look_up(&b.sample, &a.views, a_from_b, &mut sum);
-    look_up(&a.sample, &b.views, &a_from_b.inverse(), &mut sum);
+    look_up(&b.sample, &a.views, a_from_b, TOLERANCE_M, TOLERANCE_PER_M, &mut sum);
+    look_up(&a.sample, &b.views, &a_from_b.inverse(), TOLERANCE_M, TOLERANCE_PER_M, &mut sum);
     sum
 }
 
-fn look_up(sample: &[Point], views: &[View], views_from_sample: &Pose2, sum: &mut Agreement) {
-    let moved: Vec<Point> = sample.iter().map(|p| p.moved(views_from_sample)).collect();
-    let (mut seen, mut through) = (vec![0u16; moved.len()], vec![0u16; moved.len()]);
+pub fn quick(a: &Content, b: &Content, a_from_b: &Pose2, points: usize, views: usize, tol: f64, per: f64) -> Agreement {
+    let mut sum = Agreement::default();
+    let few = |c: &Content| -> (Vec<Point>, Vec<View>) {
+        (c.sample.iter().step_by(c.sample.len().div_ceil(points).max(1)).copied().collect(),
+         c.views.iter().step_by(c.views.len().div_ceil(views).max(1)).cloned().collect())
+    };
+    let (ap, av) = few(a);
+    let (bp, bv) = few(b);
+    look_up(&bp, &av, a_from_b, tol, per, &mut sum);
+    look_up(&ap, &bv, &a_from_b.inverse(), tol, per, &mut sum);
+    sum
+}
+
+fn look_up(sample: &[Point], views: &[View], views_from_sample: &Pose2, tol: f64, per: f64, sum: &mut Agreement) {
+    let (mut seen, mut through) = (vec![0u16; sample.len()], vec![0u16; sample.len()]);
     for view in views {
-        let laser_from_place = view.place_from_laser.inverse();
-        for (k, p) in moved.iter().enumerate() {
-            let q = p.moved(&laser_from_place);
-            let (x, y) = (f64::from(q.x), f64::from(q.y));
-            let range_m = x.hypot(y);
+        let x = view.place_from_laser.inverse().compose(views_from_sample);
+        let (s, c) = x.yaw_rad.sin_cos();
+        for (k, p) in sample.iter().enumerate() {
+            let (px, py, nx, ny) = (f64::from(p.x), f64::from(p.y), f64::from(p.nx), f64::from(p.ny));
+            let (qx, qy) = (x.x_m + c * px - s * py, x.y_m + s * px + c * py);
+            let range_m = (qx * qx + qy * qy).sqrt();
             // A surface can only be seen from its front.
-            if f64::from(q.nx) * x + f64::from(q.ny) * y > -0.1 * range_m {
+            if (c * nx - s * ny) * qx + (s * nx + c * ny) * qy > -0.1 * range_m {
                 continue;
             }
-            let Some((near_m, far_m)) = view.image.at(y.atan2(x)) else { continue };
-            let tolerance_m = TOLERANCE_M + TOLERANCE_PER_M * range_m;
+            let Some((near_m, far_m)) = view.image.at(qy.atan2(qx)) else { continue };
+            let tolerance_m = tol + per * range_m;
             if range_m < near_m - tolerance_m {
                 through[k] += 1;
             } else if range_m <= far_m + tolerance_m {

@@ -1,9 +1,9 @@
 //! Two places' scans to modes: the measurement z behind every loop edge.
 
-use super::agree::agreement;
+use super::agree::{agreement, quick};
 use super::align::align;
 use super::cloud::Index;
-use super::correlate::{self, Pyramid};
+use super::correlate;
 use super::place::{Content, spread};
 use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
@@ -36,7 +36,7 @@ pub struct Mode {
 /// A place made ready as a target.
 pub struct Target {
     index: Index,
-    pyramid: Option<Pyramid>,
+    pyramid: Option<correlate::Target>,
 }
 
 impl Target {
@@ -47,7 +47,7 @@ impl Target {
 
     /// For the prior-free search too.
     pub fn wide(content: &Content) -> Self {
-        Self { pyramid: Some(Pyramid::new(&content.cloud)), ..Self::near(content) }
+        Self { pyramid: Some(correlate::Target::new(&content.cloud, &content.sample)), ..Self::near(content) }
     }
 }
 
@@ -71,10 +71,38 @@ pub fn refine(i: &Content, target: &Target, j: &Content, guess: &Pose2) -> Optio
 
 /// All modes of a pair, best first, found without any prior.
 pub fn modes(i: &Content, target: &Target, j: &Content) -> Vec<Mode> {
+    let e = |k: &str, d: f64| std::env::var(k).map_or(d, |v| v.parse().unwrap());
     let Some(pyramid) = &target.pyramid else { return Vec::new() };
-    let points = spread(&j.cloud, SEARCH_POINTS);
+    let points = correlate::Source::new(&spread(&j.sample, SEARCH_POINTS));
+    let few: Vec<_> = j.sample.iter().step_by(j.sample.len().div_ceil(75).max(1)).copied().collect();
+    let mut guesses: Vec<(f64, Pose2)> = Vec::new();
+    let found = correlate::search(pyramid, &points, e("SMIN", 0.2), e("K", 24.0) as usize);
+    let mut stats = [found.len(), 0, 0, 0];
+    for (guess, _) in &found {
+        let q = quick(i, j, guess, 60, 4, 0.4, 0.03);
+        if q.score() < e("Q1", 0.83) || q.overlap() < e("O1", 0.18) {
+            continue;
+        }
+        stats[1] += 1;
+        let Some(a) = align(&few, &target.index, guess, None, GATE_M) else { continue };
+        let q = quick(i, j, &a.target_from_source, 60, 4, 0.25, 0.02);
+        if q.score() < e("Q2", 0.7) || q.overlap() < e("O2", 0.2) {
+            continue;
+        }
+        guesses.push((q.score() * q.overlap(), a.target_from_source));
+    }
+    stats[2] = guesses.len();
+    guesses.sort_by(|a, b| b.0.total_cmp(&a.0));
     let mut modes: Vec<Mode> = Vec::new();
-    for (guess, _) in correlate::search(pyramid, &points, SEARCH_SCORE_MIN, MODES_MAX) {
+    for (_, guess) in guesses {
+        let near = |m: &Mode| {
+            let d = m.i_from_j.between(&guess);
+            d.x_m.hypot(d.y_m) < 0.3 && d.yaw_rad.abs() < 0.1
+        };
+        if modes.iter().any(near) {
+            continue;
+        }
+        stats[3] += 1;
         let Some(mode) = refine(i, target, j, &guess) else { continue };
         let known = |m: &Mode| {
             let d = m.i_from_j.between(&mode.i_from_j);
@@ -82,8 +110,12 @@ pub fn modes(i: &Content, target: &Target, j: &Content) -> Vec<Mode> {
         };
         if !modes.iter().any(known) {
             modes.push(mode);
+            if modes.len() == MODES_MAX {
+                break;
+            }
         }
     }
+    if e("STATS", 0.0) > 0.0 { eprintln!("STATS {stats:?}"); }
     modes.sort_by(|a, b| (b.score * b.overlap).total_cmp(&(a.score * a.overlap)));
     modes
 }
