@@ -10,6 +10,7 @@
 //! stays short.
 
 use super::cloud::Point;
+use super::place::spread;
 use crate::geometry::{Pose2, wrap};
 use std::collections::BinaryHeap;
 use std::f32::consts::TAU;
@@ -42,8 +43,8 @@ const BLOCKS: usize = SHIFTS / BLOCK;
 const LANES: usize = BLOCKS.next_multiple_of(16);
 /// Edge of the grid of one phase.
 const PHASE_SIZE: usize = SIZE / BLOCK;
-/// Source points used at most: sums are bytes.
-pub const POINTS_MAX: usize = 160;
+/// Source points used at most; sums are bytes.
+const POINTS_MAX: usize = 160;
 /// Nodes looked at before the search gives up on further modes.
 const BUDGET: usize = 2_000;
 
@@ -56,7 +57,7 @@ pub struct Source {
 
 /// The target as grids of octants, and how much of it faces where.
 #[derive(Clone, Debug)]
-pub struct Target {
+pub struct Raster {
     cells: Vec<u8>,
     /// The OR over BLOCK × BLOCK cells to the upper right of each cell, de-interleaved: the cells
     /// that the blocks of translations take one point to lie side by side.
@@ -100,15 +101,15 @@ fn directions(points: &[Oriented]) -> [f32; HEADINGS] {
 }
 
 impl Source {
-    /// Of at most [`POINTS_MAX`] points, spread over the surfaces.
+    /// Of points spread evenly over the surfaces.
     pub fn new(sample: &[Point]) -> Self {
         let points: Vec<Oriented> =
-            oriented(sample).filter(|p| p.x.hypot(p.y) < REACH_M).take(POINTS_MAX).collect();
+            oriented(&spread(sample, POINTS_MAX)).filter(|p| p.x.hypot(p.y) < REACH_M).collect();
         Self { directions: directions(&points), points }
     }
 }
 
-impl Target {
+impl Raster {
     /// Rasterises a cloud; `sample` is its points spread evenly over the surfaces.
     pub fn new(cloud: &[Point], sample: &[Point]) -> Self {
         let mut cells = vec![0u8; SIZE * SIZE];
@@ -181,7 +182,7 @@ struct Node {
 
 /// Transforms `target_from_source` under which the clouds overlap best, best first, at most
 /// `modes_max`, each with the share of source points that hit. Those below `score_min` are left out.
-pub fn search(target: &Target, source: &Source, score_min: f64, modes_max: usize) -> Vec<(Pose2, f64)> {
+pub fn search(target: &Raster, source: &Source, score_min: f64, modes_max: usize) -> Vec<(Pose2, f64)> {
     let floor = ((score_min * source.points.len() as f64) as u8).max(1);
     let mut placed: Vec<(u8, Vec<Placed>)> = Vec::new();
     let mut heap = BinaryHeap::new();
@@ -217,12 +218,10 @@ pub fn search(target: &Target, source: &Source, score_min: f64, modes_max: usize
 }
 
 /// The headings under which the surfaces' directions correlate best.
-pub fn headings(target: &Target, source: &Source) -> Vec<usize> {
+fn headings(target: &Raster, source: &Source) -> Vec<usize> {
     let t = &target.directions;
     let blurred: Vec<f32> = (0..2 * HEADINGS)
-        .map(|k| {
-            2.0 * t[k % HEADINGS] + t[(k + 1) % HEADINGS] + t[(k + HEADINGS - 1) % HEADINGS]
-        })
+        .map(|k| 2.0 * t[k % HEADINGS] + t[(k + 1) % HEADINGS] + t[(k + HEADINGS - 1) % HEADINGS])
         .collect();
     let mut scored: Vec<(f32, usize)> = (0..HEADINGS)
         .map(|h| (source.directions.iter().zip(&blurred[h..]).map(|(a, b)| a * b).sum(), h))
@@ -247,7 +246,7 @@ fn place(source: &Source, heading: usize) -> Vec<Placed> {
 }
 
 /// Pushes the blocks of a heading whose bounds reach the floor.
-fn push_blocks(heap: &mut BinaryHeap<Node>, target: &Target, points: &[Placed], heading: u8, floor: u8) {
+fn push_blocks(heap: &mut BinaryHeap<Node>, target: &Raster, points: &[Placed], heading: u8, floor: u8) {
     let starts: Vec<(usize, u8)> =
         points.iter().map(|p| (phase_index(p.x.into(), p.y.into()), p.octant)).collect();
     for row in 0..BLOCKS {
@@ -266,11 +265,9 @@ fn push_blocks(heap: &mut BinaryHeap<Node>, target: &Target, points: &[Placed], 
     }
 }
 
-fn hits(target: &Target, points: &[Placed], x: u8, y: u8) -> u8 {
+fn hits(target: &Raster, points: &[Placed], x: u8, y: u8) -> u8 {
     let shift = usize::from(y) * SIZE + usize::from(x);
-    let hit = |p: &&Placed| {
-        target.cells[usize::from(p.y) * SIZE + usize::from(p.x) + shift] & p.octant != 0
-    };
+    let hit = |p: &&Placed| target.cells[usize::from(p.y) * SIZE + usize::from(p.x) + shift] & p.octant != 0;
     points.iter().filter(hit).count() as u8
 }
 
@@ -286,9 +283,100 @@ fn near_known(node: &Node, centre: &Pose2, found: &[(Pose2, f64)]) -> bool {
 fn pose_of(node: &Node, heading: u8) -> Pose2 {
     let middle = if node.leaf { 0.0 } else { 0.5 };
     let shift_m = |k: u8| (f64::from(k) + middle - SHIFTS as f64 / 2.0) * f64::from(CELL_M);
-    Pose2::new(
-        shift_m(node.x),
-        shift_m(node.y),
-        f64::from(heading) * std::f64::consts::TAU / HEADINGS as f64,
-    )
+    Pose2::new(shift_m(node.x), shift_m(node.y), f64::from(heading) * std::f64::consts::TAU / HEADINGS as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn line(from: (f32, f32), to: (f32, f32)) -> impl Iterator<Item = Point> {
+        let (dx, dy) = (to.0 - from.0, to.1 - from.1);
+        let length = dx.hypot(dy);
+        let n = (length / 0.1) as usize;
+        (0..n).map(move |k| {
+            let f = k as f32 / n as f32;
+            Point { x: from.0 + f * dx, y: from.1 + f * dy, nx: -dy / length, ny: dx / length }
+        })
+    }
+
+    /// An L of walls with a stub: unlike itself under every turn.
+    fn walls() -> Vec<Point> {
+        line((-4.0, -3.0), (5.0, -3.0))
+            .chain(line((5.0, -3.0), (5.0, 2.0)))
+            .chain(line((1.0, -3.0), (1.0, -1.0)))
+            .collect()
+    }
+
+    fn found(target: &[Point], source: &[Point], modes_max: usize) -> Vec<(Pose2, f64)> {
+        search(&Raster::new(target, target), &Source::new(source), 0.3, modes_max)
+    }
+
+    proptest! {
+        #[test]
+        fn finds_a_transform_anywhere_in_the_window(
+            x in -9.7f64..9.7, y in -9.7f64..9.7, yaw in -3.1f64..3.1,
+        ) {
+            let truth = Pose2::new(x, y, yaw);
+            let source: Vec<Point> = walls().iter().map(|p| p.moved(&truth.inverse())).collect();
+            let (best, share) = found(&walls(), &source, 4)[0];
+            let off = truth.between(&best);
+            prop_assert!(off.x_m.hypot(off.y_m) < 0.6 && off.yaw_rad.abs() < 0.1, "{best:?}");
+            prop_assert!(share > 0.8, "{share}");
+        }
+
+        #[test]
+        fn the_best_is_the_best_of_all_translations(
+            corners in prop::collection::vec((-7.0f32..7.0, -7.0f32..7.0), 4..9),
+        ) {
+            let cloud: Vec<Point> = corners.windows(2).flat_map(|c| line(c[0], c[1])).collect();
+            let (target, source) = (Raster::new(&walls(), &walls()), Source::new(&cloud));
+            let n = source.points.len() as f64;
+            let brute = headings(&target, &source)
+                .into_iter()
+                .flat_map(|h| {
+                    let points = place(&source, h);
+                    (0..SHIFTS as u8).flat_map(|y| (0..SHIFTS as u8).map(move |x| (x, y)))
+                        .map(|(x, y)| hits(&target, &points, x, y))
+                        .max()
+                })
+                .max()
+                .unwrap_or(0);
+            let best = search(&target, &source, 0.0, 1).first().map_or(0.0, |f| f.1);
+            prop_assert!((best - f64::from(brute) / n).abs() < 1e-9, "{best} {brute} of {n}");
+        }
+    }
+
+    #[test]
+    fn a_wall_is_not_hit_from_behind() {
+        let wall: Vec<Point> = line((-3.0, 1.0), (3.0, 1.0)).collect();
+        let behind: Vec<Point> = wall.iter().map(|p| Point { nx: -p.nx, ny: -p.ny, ..*p }).collect();
+        // Only turned round does the one lie on the other.
+        for (pose, _) in found(&wall, &behind, 8) {
+            assert!(wrap(pose.yaw_rad).abs() > 2.8, "{pose:?}");
+        }
+    }
+
+    #[test]
+    fn a_straight_wall_has_many_modes_and_an_empty_place_none() {
+        let wall: Vec<Point> = line((-10.0, 1.0), (10.0, 1.0)).collect();
+        let piece = &wall[70..130];
+        assert_eq!(found(&wall, piece, 4).len(), 4);
+        assert!(found(&[], piece, 4).is_empty());
+        assert!(found(&wall, &[], 4).is_empty());
+    }
+
+    #[test]
+    fn modes_are_apart_and_in_order() {
+        let modes = found(&walls(), &walls(), 12);
+        assert!(modes.len() > 1 && modes.windows(2).all(|m| m[0].1 >= m[1].1));
+        for (k, (a, _)) in modes.iter().enumerate() {
+            for (b, _) in &modes[..k] {
+                assert!(
+                    a.distance_m(b) > DISTINCT_M - 1e-6 || wrap(a.yaw_rad - b.yaw_rad).abs() >= DISTINCT_RAD
+                );
+            }
+        }
+    }
 }
