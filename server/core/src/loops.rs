@@ -9,8 +9,9 @@ use crate::effects::EdgeKind;
 use crate::geometry::Pose2;
 use crate::graph::{Graph, Matched, Vertex};
 use crate::propose::Proposal;
+use crate::scan::correlate::Source;
 use crate::scan::front::LOCAL_PATH_M;
-use crate::scan::matching::{Mode, Target, modes, refine};
+use crate::scan::matching::{Mode, index, modes, refine};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -186,13 +187,14 @@ fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
 fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
     let new: Vec<Vertex> =
         proposals.iter().map(|p| p.i).filter(|&i| !graph.memo.contains_key(&(i, t))).collect();
+    if new.is_empty() {
+        return;
+    }
     let here = &graph.place(t).content;
+    let source = Source::new(&here.sample);
     let found: Vec<(Vertex, Matched)> = new
         .par_iter()
-        .map(|&i| {
-            let older = &graph.place(i).content;
-            (i, Matched { modes: modes(older, &Target::wide(older), here) })
-        })
+        .map(|&i| (i, Matched { modes: modes(&graph.place(i).content, here, &source) }))
         .collect();
     graph.memo.extend(found.into_iter().map(|(i, m)| ((i, t), m)));
 }
@@ -239,7 +241,7 @@ fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
 /// The mode near a guess, if there is a good one that agrees with it.
 fn agreeing(graph: &Graph, i: Vertex, j: Vertex, guess: &Pose2) -> Option<Mode> {
     let (older, newer) = (&graph.place(i).content, &graph.place(j).content);
-    let mode = refine(older, &Target::near(older), newer, guess)?;
+    let mode = refine(older, &index(older), newer, guess)?;
     let off = guess.between(&mode.i_from_j);
     (good(&mode) && off.x_m.hypot(off.y_m) < AGREE_M && off.yaw_rad.abs() < AGREE_RAD).then_some(mode)
 }

@@ -8,10 +8,31 @@ use super::cloud::Point;
 use super::place::{Content, View};
 use crate::geometry::Pose2;
 
-/// Ranges this near are the same surface.
-const TOLERANCE_M: f64 = 0.25;
-/// Plus so much per metre of range.
-const TOLERANCE_PER_M: f64 = 0.02;
+/// Agreeing points that a conflicting one outweighs.
+const CONFLICT_WEIGHT: f64 = 5.0;
+
+/// How closely two places are compared.
+#[derive(Clone, Copy, Debug)]
+pub struct Look {
+    /// Points of either place looked up, at most.
+    pub points_max: usize,
+    /// Range images of either place that they are looked up in, at most.
+    pub views_max: usize,
+    /// Ranges this near are the same surface …
+    pub tolerance_m: f64,
+    /// … plus so much per metre of range.
+    pub tolerance_per_m: f64,
+}
+
+impl Look {
+    /// At everything.
+    pub const CLOSE: Self =
+        Self { points_max: usize::MAX, views_max: usize::MAX, tolerance_m: 0.25, tolerance_per_m: 0.02 };
+    /// At a little.
+    pub const BRIEF: Self = Self { points_max: 60, views_max: 4, ..Self::CLOSE };
+    /// At a little, under a transform known to a decimetre or two and a degree or two only.
+    pub const ROUGH: Self = Self { tolerance_m: 0.4, tolerance_per_m: 0.03, ..Self::BRIEF };
+}
 
 /// How two contents compare under a transform.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -30,6 +51,14 @@ impl Agreement {
         f64::from(self.agree) / f64::from((self.agree + self.conflict).max(1))
     }
 
+    /// How much speaks for the two being one: what agrees less several times what conflicts, per
+    /// point. By overlap alone, a corridor slid along itself would look better than a true fit
+    /// that shows less of it.
+    pub fn worth(&self) -> f64 {
+        let sum = f64::from(self.agree) - CONFLICT_WEIGHT * f64::from(self.conflict);
+        sum / f64::from(self.points.max(1))
+    }
+
     /// Share of all points that the other place saw too.
     pub fn overlap(&self) -> f64 {
         f64::from(self.agree) / f64::from(self.points.max(1))
@@ -37,41 +66,40 @@ impl Agreement {
 }
 
 /// Compares both ways.
-pub fn agreement(a: &Content, b: &Content, a_from_b: &Pose2) -> Agreement {
+pub fn agreement(a: &Content, b: &Content, a_from_b: &Pose2, look: &Look) -> Agreement {
     let mut sum = Agreement::default();
-    look_up(&b.sample, &a.views, a_from_b, &mut sum);
-    look_up(&a.sample, &b.views, &a_from_b.inverse(), &mut sum);
+    look_up(&b.sample, &a.views, a_from_b, look, &mut sum);
+    look_up(&a.sample, &b.views, &a_from_b.inverse(), look, &mut sum);
     sum
 }
 
-fn look_up(sample: &[Point], views: &[View], views_from_sample: &Pose2, sum: &mut Agreement) {
-    let moved: Vec<Point> = sample.iter().map(|p| p.moved(views_from_sample)).collect();
-    let (mut seen, mut through) = (vec![0u16; moved.len()], vec![0u16; moved.len()]);
-    for view in views {
-        let laser_from_place = view.place_from_laser.inverse();
-        for (k, p) in moved.iter().enumerate() {
-            let q = p.moved(&laser_from_place);
-            let (x, y) = (f64::from(q.x), f64::from(q.y));
-            let range_m = x.hypot(y);
+fn look_up(sample: &[Point], views: &[View], views_from_sample: &Pose2, look: &Look, sum: &mut Agreement) {
+    let every = |n: usize, most: usize| n.div_ceil(most).max(1);
+    let points: Vec<&Point> = sample.iter().step_by(every(sample.len(), look.points_max)).collect();
+    // Views that saw the point, less those that saw through where it would be.
+    let mut votes = vec![0i32; points.len()];
+    for view in views.iter().step_by(every(views.len(), look.views_max)) {
+        let laser_from_sample = view.place_from_laser.inverse().compose(views_from_sample);
+        let (s, c) = laser_from_sample.yaw_rad.sin_cos();
+        for (vote, p) in votes.iter_mut().zip(&points) {
+            let (nx, ny) = (f64::from(p.nx), f64::from(p.ny));
+            let (x, y) = (f64::from(p.x), f64::from(p.y));
+            let (x, y) = (laser_from_sample.x_m + c * x - s * y, laser_from_sample.y_m + s * x + c * y);
+            let range_m = (x * x + y * y).sqrt();
             // A surface can only be seen from its front.
-            if f64::from(q.nx) * x + f64::from(q.ny) * y > -0.1 * range_m {
+            if (c * nx - s * ny) * x + (s * nx + c * ny) * y > -0.1 * range_m {
                 continue;
             }
             let Some((near_m, far_m)) = view.image.at(y.atan2(x)) else { continue };
-            let tolerance_m = TOLERANCE_M + TOLERANCE_PER_M * range_m;
+            let tolerance_m = look.tolerance_m + look.tolerance_per_m * range_m;
             if range_m < near_m - tolerance_m {
-                through[k] += 1;
+                *vote -= 1;
             } else if range_m <= far_m + tolerance_m {
-                seen[k] += 1;
+                *vote += 1;
             }
         }
     }
-    for (s, t) in seen.iter().zip(&through) {
-        sum.points += 1;
-        if s > t {
-            sum.agree += 1;
-        } else if t > s {
-            sum.conflict += 1;
-        }
-    }
+    sum.points += points.len() as u32;
+    sum.agree += votes.iter().filter(|v| **v > 0).count() as u32;
+    sum.conflict += votes.iter().filter(|v| **v < 0).count() as u32;
 }

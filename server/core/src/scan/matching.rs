@@ -1,20 +1,32 @@
 //! Two places' scans to modes: the measurement z behind every loop edge.
 
-use super::agree::agreement;
+use super::agree::{Look, agreement};
 use super::align::align;
-use super::cloud::Index;
-use super::correlate::{self, Pyramid};
-use super::place::{Content, spread};
+use super::cloud::{Index, Point};
+use super::correlate::{Raster, Source, search};
+use super::place::Content;
 use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
 /// Modes kept of a pair.
 const MODES_MAX: usize = 4;
-/// Look-up score below which the search does not descend.
-const SEARCH_SCORE_MIN: f64 = 0.4;
-/// Points of the source that the search looks up.
-const SEARCH_POINTS: usize = 160;
+/// Share of the source's points that must hit for a transform to be looked at.
+const HIT_SHARE_MIN: f64 = 0.22;
+/// Transforms looked at.
+const GUESSES_MAX: usize = 24;
+/// At a rough look, true fits score more than this, and most others less …
+const ROUGH_SCORE_MIN: f64 = 0.83;
+const ROUGH_OVERLAP_MIN: f64 = 0.18;
+/// … as after a rough registration, with so many points.
+const BRIEF_SCORE_MIN: f64 = 0.7;
+const BRIEF_OVERLAP_MIN: f64 = 0.2;
+const BRIEF_POINTS: usize = 75;
+/// Modes worth less than this share of the best are none.
+const WORTH_SHARE_MIN: f64 = 0.5;
+/// Modes nearer than this are one.
+const DISTINCT_M: f64 = 0.3;
+const DISTINCT_RAD: f64 = 0.1;
 const GATE_M: f32 = 0.5;
 /// What registration of two places may be wrong by beyond its own information.
 const SIGMA_M: f64 = 0.02;
@@ -33,34 +45,26 @@ pub struct Mode {
     pub overlap: f64,
 }
 
-/// A place made ready as a target.
-pub struct Target {
-    index: Index,
-    pyramid: Option<Pyramid>,
+/// The mode at a guess, if registration finds one. `index` is that of the older place `i`.
+pub fn refine(i: &Content, index: &Index, j: &Content, guess: &Pose2) -> Option<Mode> {
+    let coarse = align(&j.sample, index, guess, None, GATE_M)?;
+    polish(i, index, j, &coarse.target_from_source)
 }
 
-impl Target {
-    /// For registration from a guess.
-    pub fn near(content: &Content) -> Self {
-        Self { index: Index::new(&content.cloud, GATE_M), pyramid: None }
-    }
-
-    /// For the prior-free search too.
-    pub fn wide(content: &Content) -> Self {
-        Self { pyramid: Some(Pyramid::new(&content.cloud)), ..Self::near(content) }
-    }
+/// For [`refine`].
+pub fn index(content: &Content) -> Index {
+    Index::new(&content.cloud, GATE_M)
 }
 
-/// The mode at a guess, if registration finds one.
-pub fn refine(i: &Content, target: &Target, j: &Content, guess: &Pose2) -> Option<Mode> {
-    let coarse = align(&j.sample, &target.index, guess, None, GATE_M)?;
-    let found = align(&j.cloud, &target.index, &coarse.target_from_source, None, GATE_M / 2.0)?;
+/// The mode at a transform that a sample is registered to.
+fn polish(i: &Content, index: &Index, j: &Content, coarse: &Pose2) -> Option<Mode> {
+    let found = align(&j.cloud, index, coarse, None, GATE_M / 2.0)?;
     let floor = Matrix3::from_diagonal(&Vector3::new(SIGMA_M.powi(2), SIGMA_M.powi(2), SIGMA_RAD.powi(2)));
     // Along a bare corridor the information is all but singular: a metre's uncertainty or more.
     let weak = Matrix3::from_diagonal(&Vector3::new(0.04, 0.04, 1.0));
     let per_sample = j.sample.len() as f64 / j.cloud.len().max(1) as f64;
     let covariance = (found.information * per_sample + weak).try_inverse()? + floor;
-    let agreement = agreement(i, j, &found.target_from_source);
+    let agreement = agreement(i, j, &found.target_from_source, &Look::CLOSE);
     Some(Mode {
         i_from_j: found.target_from_source,
         covariance: (covariance + covariance.transpose()) * 0.5,
@@ -69,21 +73,168 @@ pub fn refine(i: &Content, target: &Target, j: &Content, guess: &Pose2) -> Optio
     })
 }
 
-/// All modes of a pair, best first, found without any prior.
-pub fn modes(i: &Content, target: &Target, j: &Content) -> Vec<Mode> {
-    let Some(pyramid) = &target.pyramid else { return Vec::new() };
-    let points = spread(&j.cloud, SEARCH_POINTS);
+/// All modes of a pair, best first, found without any prior. `source` is made of `j`.
+pub fn modes(i: &Content, j: &Content, source: &Source) -> Vec<Mode> {
+    let found = search(&Raster::new(&i.cloud, &i.sample), source, HIT_SHARE_MIN, GUESSES_MAX);
+    let plausible = |guess: &Pose2| {
+        let rough = agreement(i, j, guess, &Look::ROUGH);
+        rough.score() >= ROUGH_SCORE_MIN && rough.overlap() >= ROUGH_OVERLAP_MIN
+    };
+    let guesses: Vec<Pose2> = found.into_iter().map(|(guess, _)| guess).filter(plausible).collect();
+    if guesses.is_empty() {
+        return Vec::new();
+    }
+    let index = index(i);
     let mut modes: Vec<Mode> = Vec::new();
-    for (guess, _) in correlate::search(pyramid, &points, SEARCH_SCORE_MIN, MODES_MAX) {
-        let Some(mode) = refine(i, target, j, &guess) else { continue };
-        let known = |m: &Mode| {
-            let d = m.i_from_j.between(&mode.i_from_j);
-            d.x_m.hypot(d.y_m) < 0.3 && d.yaw_rad.abs() < 0.1
-        };
-        if !modes.iter().any(known) {
+    for guess in registered(i, &index, j, &guesses) {
+        if modes.iter().any(|m| same(&m.i_from_j, &guess)) {
+            continue;
+        }
+        let Some(mode) = polish(i, &index, j, &guess) else { continue };
+        if !modes.iter().any(|m| same(&m.i_from_j, &mode.i_from_j)) {
             modes.push(mode);
+        }
+        if modes.len() == MODES_MAX {
+            break;
         }
     }
     modes.sort_by(|a, b| (b.score * b.overlap).total_cmp(&(a.score * a.overlap)));
     modes
+}
+
+/// Guesses registered with a few points, without those that the laser contradicts and those worth
+/// far less than the best; best first.
+fn registered(i: &Content, index: &Index, j: &Content, guesses: &[Pose2]) -> Vec<Pose2> {
+    let every = j.sample.len().div_ceil(BRIEF_POINTS).max(1);
+    let few: Vec<Point> = j.sample.iter().step_by(every).copied().collect();
+    let mut registered: Vec<(f64, Pose2)> = Vec::new();
+    for guess in guesses {
+        let Some(found) = align(&few, index, guess, None, GATE_M) else { continue };
+        let brief = agreement(i, j, &found.target_from_source, &Look::BRIEF);
+        if brief.score() >= BRIEF_SCORE_MIN && brief.overlap() >= BRIEF_OVERLAP_MIN {
+            registered.push((brief.worth(), found.target_from_source));
+        }
+    }
+    registered.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let least = registered.first().map_or(0.0, |best| WORTH_SHARE_MIN * best.0);
+    registered.into_iter().filter(|r| r.0 >= least).map(|r| r.1).collect()
+}
+
+fn same(a: &Pose2, b: &Pose2) -> bool {
+    let off = a.between(b);
+    off.x_m.hypot(off.y_m) < DISTINCT_M && off.yaw_rad.abs() < DISTINCT_RAD
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::event::{Laser, Scan};
+    use crate::geometry::wrap;
+    use crate::scan::sweep::{Sweep, sweep};
+    use std::f64::consts::{PI, TAU};
+
+    /// What a laser of 360° sees of walls, (x0, y0, x1, y1), from a pose.
+    fn seen(walls: &[[f64; 4]], world_from_laser: &Pose2) -> Sweep {
+        let ranges_m = (0..720)
+            .map(|k| {
+                let (s, c) = (world_from_laser.yaw_rad - PI + f64::from(k) * TAU / 720.0).sin_cos();
+                let hit = |w: &[f64; 4]| {
+                    let (dx, dy) = (w[2] - w[0], w[3] - w[1]);
+                    let (ox, oy) = (w[0] - world_from_laser.x_m, w[1] - world_from_laser.y_m);
+                    let det = dx * s - dy * c;
+                    let (range, along) = ((dx * oy - dy * ox) / det, (c * oy - s * ox) / det);
+                    (range > 0.0 && (0.0..=1.0).contains(&along)).then_some(range as f32)
+                };
+                walls.iter().filter_map(hit).fold(f32::INFINITY, f32::min)
+            })
+            .collect();
+        let scan = Scan {
+            robot: "r".into(),
+            laser: "l".into(),
+            stamp_ns: 0,
+            angle_min_rad: -PI,
+            angle_increment_rad: TAU / 720.0,
+            time_increment_s: 0.0,
+            ranges_m,
+        };
+        let laser = Laser {
+            id: "l".into(),
+            body_from_laser: Pose2::default(),
+            upside_down: false,
+            range_min_m: 0.05,
+            range_max_m: 80.0,
+            ignored_rad: vec![],
+        };
+        sweep(&scan, &laser, |_| Pose2::default())
+    }
+
+    fn content(walls: &[[f64; 4]], world_from_place: &Pose2) -> Content {
+        let steps: Vec<(Pose2, Sweep)> = (-2..=2)
+            .map(|k| Pose2::new(f64::from(k) * 0.4, 0.0, 0.0))
+            .map(|step| (step, seen(walls, &world_from_place.compose(&step))))
+            .collect();
+        let steps: Vec<(Pose2, &Sweep)> = steps.iter().map(|(p, s)| (*p, s)).collect();
+        Content::new(&steps)
+    }
+
+    fn found(i: &Content, j: &Content) -> Vec<Mode> {
+        modes(i, j, &Source::new(&j.sample))
+    }
+
+    /// A room of 9 m × 6 m with a niche, a cupboard and a screen.
+    const ROOM: [[f64; 4]; 9] = [
+        [-4.0, -3.0, 5.0, -3.0],
+        [5.0, -3.0, 5.0, 3.0],
+        [5.0, 3.0, 2.0, 3.0],
+        [2.0, 3.0, 2.0, 4.2],
+        [2.0, 4.2, 0.5, 4.2],
+        [0.5, 4.2, 0.5, 3.0],
+        [0.5, 3.0, -4.0, 3.0],
+        [-4.0, 3.0, -4.0, -3.0],
+        [3.2, -3.0, 3.2, -1.6],
+    ];
+
+    #[test]
+    fn a_room_is_known_again_from_elsewhere_and_turned_round() {
+        let old = Pose2::new(-1.5, -1.0, 0.3);
+        for new in [Pose2::new(0.5, 1.0, -2.6), Pose2::new(1.8, 0.2, 1.9), old] {
+            let best = found(&content(&ROOM, &old), &content(&ROOM, &new))[0];
+            let off = old.between(&new).between(&best.i_from_j);
+            assert!(off.x_m.hypot(off.y_m) < 0.05 && off.yaw_rad.abs() < 0.01, "{new:?} {best:?}");
+            assert!(best.score > 0.9 && best.overlap > 0.4, "{best:?}");
+            assert!(best.covariance[(0, 0)].max(best.covariance[(1, 1)]).sqrt() < 0.1, "{best:?}");
+        }
+    }
+
+    #[test]
+    fn a_bare_corridor_is_free_along_itself() {
+        let corridor = [[-40.0, -1.0, 40.0, -1.0], [-40.0, 1.0, 40.0, 1.0]];
+        let modes =
+            found(&content(&corridor, &Pose2::default()), &content(&corridor, &Pose2::new(2.0, 0.2, 0.0)));
+        assert!(!modes.is_empty());
+        for m in modes {
+            assert!(m.covariance[(0, 0)].max(m.covariance[(1, 1)]).sqrt() > 0.15, "{m:?}");
+        }
+    }
+
+    #[test]
+    fn a_room_that_looks_the_same_turned_round_has_two_modes() {
+        let oblong =
+            [[-4.0, -3.0, 4.0, -3.0], [4.0, -3.0, 4.0, 3.0], [4.0, 3.0, -4.0, 3.0], [-4.0, 3.0, -4.0, -3.0]];
+        let place = content(&oblong, &Pose2::new(0.3, 0.2, 0.1));
+        let modes = found(&place, &place);
+        assert_eq!(modes.len(), 2, "{modes:?}");
+        assert!((wrap(modes[0].i_from_j.yaw_rad - modes[1].i_from_j.yaw_rad).abs() - PI).abs() < 0.02);
+    }
+
+    #[test]
+    fn what_is_not_alike_does_not_fit() {
+        let hall =
+            [[-9.0, -7.0, 9.0, -7.0], [9.0, -7.0, 7.0, 8.0], [7.0, 8.0, -9.0, 6.0], [-9.0, 6.0, -9.0, -7.0]];
+        let good = |m: &Mode| m.score > 0.75 && m.overlap > 0.25;
+        let modes = found(&content(&ROOM, &Pose2::default()), &content(&hall, &Pose2::default()));
+        assert!(!modes.iter().any(good), "{modes:?}");
+        let empty = content(&[], &Pose2::default());
+        assert!(found(&empty, &content(&ROOM, &Pose2::default())).is_empty());
+    }
 }
