@@ -1,8 +1,7 @@
 //! Wheel odometry as it comes: repeated and backward stamps, restarts, jumps.
 
 use crate::event::{Odom, StampNs};
-use crate::geometry::{Pose2, wrap};
-use nalgebra::{Matrix3, Vector3};
+use crate::geometry::Pose2;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -84,15 +83,6 @@ impl Odometry {
         }
         Some(later.1)
     }
-}
-
-/// Covariance of an odometry increment (right perturbation): generous, for wheels on any floor.
-pub fn increment_covariance(increment: &Pose2) -> Matrix3<f64> {
-    let d_m = increment.x_m.hypot(increment.y_m);
-    let turn_rad = wrap(increment.yaw_rad).abs();
-    let along_m = 0.002 + 0.10 * d_m + 0.02 * turn_rad;
-    let yaw_rad = 0.001 + 0.10 * turn_rad + 0.03 * d_m;
-    Matrix3::from_diagonal(&Vector3::new(along_m.powi(2), along_m.powi(2), yaw_rad.powi(2)))
 }
 
 #[cfg(test)]

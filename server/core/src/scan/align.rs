@@ -4,7 +4,7 @@
 //! Minimises Σ_k ρ(n_kᵀ(X p_k − q_k)) + ‖log(X₀⁻¹X)‖²_P over X = target_from_source, where q_k with
 //! normal n_k is the target's point nearest to X p_k, by iteratively reweighted Gauss–Newton.
 
-use super::cloud::{Index, Point};
+use super::cloud::{Point, Surfaces};
 use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
 
@@ -17,6 +17,13 @@ const KERNEL_M: f64 = 0.06;
 /// A pair within this distance along the normal is an inlier.
 const INLIER_M: f64 = 0.10;
 const ITERATIONS_MAX: usize = 25;
+/// Points that are enough to come near.
+const COARSE_POINTS: usize = 60;
+/// Fewer pairs are no fit.
+const PAIRS_MIN: usize = 10;
+/// Steps below end it.
+const STILL_M: f64 = 3e-4;
+const STILL_RAD: f64 = 5e-5;
 
 /// A Gaussian on the transform sought.
 #[derive(Clone, Copy, Debug)]
@@ -39,22 +46,25 @@ pub struct Alignment {
 }
 
 /// Registers `source` to `target`. Pairs farther apart than the gate do not count; the gate
-/// shrinks from `gate_m` to a quarter of it. None if too few points pair up.
+/// shrinks from `gate_m` to a quarter of it, and only then do all points count. None if too few
+/// points pair up.
 pub fn align(
     source: &[Point],
-    target: &Index,
+    target: &impl Surfaces,
     guess: &Pose2,
     prior: Option<&Prior>,
     gate_m: f32,
 ) -> Option<Alignment> {
     let mut x = *guess;
     let mut gate = gate_m;
+    let fine_m = gate_m * 0.25;
     for iteration in 0..ITERATIONS_MAX {
-        let fit = linearise(source, target, &x, gate);
-        if fit.pairs < 10 {
+        let stride = if gate > fine_m { (source.len() / COARSE_POINTS).max(1) } else { 1 };
+        let fit = linearise(source, stride, target, &x, gate);
+        if fit.pairs < PAIRS_MIN / stride.min(2) {
             return None;
         }
-        let (mut h, mut g) = (fit.information, fit.gradient);
+        let (mut h, mut g) = (fit.information * stride as f64, fit.gradient * stride as f64);
         if let Some(p) = prior {
             let e = p.target_from_source.between(&x).log();
             h += p.information;
@@ -64,16 +74,16 @@ pub fn align(
         let damping = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0)) * 1e-3;
         let step = -(h + damping).cholesky()?.solve(&g);
         x = x.compose(&Pose2::exp(&step));
-        let still = step.xy().norm() < 1e-4 && step.z.abs() < 1e-5;
-        if still && gate <= gate_m * 0.26 {
+        let still = |f: f64| step.xy().norm() < STILL_M * f && step.z.abs() < STILL_RAD * f;
+        if gate <= fine_m && still(1.0) {
             break;
         }
-        if still || iteration % 3 == 2 {
-            gate = (gate * 0.6).max(gate_m * 0.25);
+        if still(10.0) || iteration % 3 == 2 {
+            gate = (gate * 0.6).max(fine_m);
         }
     }
-    let fit = linearise(source, target, &x, gate);
-    (fit.pairs >= 10 && x.is_finite()).then(|| Alignment {
+    let fit = linearise(source, 1, target, &x, gate);
+    (fit.pairs >= PAIRS_MIN && x.is_finite()).then(|| Alignment {
         target_from_source: x,
         information: fit.information,
         inlier_share: fit.inliers as f64 / source.len().max(1) as f64,
@@ -87,12 +97,13 @@ struct Fit {
     inliers: usize,
 }
 
-fn linearise(source: &[Point], target: &Index, x: &Pose2, gate_m: f32) -> Fit {
+/// The normal equations of every `stride`-th point.
+fn linearise(source: &[Point], stride: usize, target: &impl Surfaces, x: &Pose2, gate_m: f32) -> Fit {
     let (s, c) = x.yaw_rad.sin_cos();
     let mut sums = [0.0f64; 9];
     let (mut pairs, mut inliers) = (0, 0);
-    for p in source {
-        let moved = p.moved(x);
+    for p in source.iter().step_by(stride) {
+        let moved = p.turned(x, s, c);
         let Some(q) = target.nearest(&moved, gate_m) else { continue };
         let (nx, ny) = (f64::from(q.nx), f64::from(q.ny));
         let r = nx * f64::from(moved.x - q.x) + ny * f64::from(moved.y - q.y);
@@ -119,6 +130,7 @@ fn linearise(source: &[Point], target: &Index, x: &Pose2, gate_m: f32) -> Fit {
 
 #[cfg(test)]
 mod tests {
+    use super::super::cloud::Index;
     use super::*;
 
     fn wall(x0: f32, y0: f32, x1: f32, y1: f32) -> impl Iterator<Item = Point> {

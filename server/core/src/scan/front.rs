@@ -4,14 +4,16 @@
 //! to the scans of the last metres of path corrects. Its frame drifts; only its increments are
 //! used: the chain edges between successive places and each scan's pose in its place.
 
+use self::bridge::Dark;
 use super::align::{Alignment, Prior, align};
-use super::cloud::{Index, Point, thin};
+use super::cloud::{Point, thin};
+use super::local::LocalMap;
 use super::place::{Content, VOXEL_M};
 use super::sweep::Sweep;
+use super::wheels::Wheels;
 use crate::effects::PlaceId;
 use crate::event::StampNs;
 use crate::geometry::{Pose2, wrap};
-use crate::odometry::increment_covariance;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -36,6 +38,15 @@ const CARRIED_NS: i64 = 3_000_000_000;
 /// Wheels err with a bias (a scale, a bent axle), and fused at each scan a bias adds up: odometry
 /// decides only where the scans say next to nothing.
 const ODOMETRY_TRUST: f64 = 0.02;
+/// A scan of fewer points sees nothing.
+const SEEN_MIN: usize = 20;
+/// So much path without a look at anything is a blind stretch.
+const DARK_PATH_M: f64 = 3.0;
+/// After so much path in the dark, a pose known no better than this must not be registered to the
+/// local map: a fit would be taken for the truth.
+const VAGUE_PATH_M: f64 = 2.0;
+const VAGUE_M: f64 = 0.15;
+const VAGUE_RAD: f64 = 0.07;
 /// What the local map itself may be wrong by.
 const MAP_SIGMA_M: f64 = 0.005;
 const MAP_SIGMA_RAD: f64 = 0.002;
@@ -108,6 +119,7 @@ pub struct FrontEnd {
     /// Of the newest scan.
     stamp_ns: StampNs,
     path_m: f64,
+    wheels: Wheels,
     /// Covariance of the pose in the local map.
     in_map: Matrix3<f64>,
     /// Covariance of the pose relative to the last place.
@@ -118,9 +130,11 @@ pub struct FrontEnd {
     fresh: bool,
     keys: VecDeque<Key>,
     open: VecDeque<OpenPlace>,
-    /// Index of the local map; a function of `keys`.
+    /// A blind stretch that is not dealt with yet.
+    dark: Option<Dark>,
+    /// The local map; a function of `keys`.
     #[serde(skip)]
-    local: Option<Index>,
+    local: Option<LocalMap>,
 }
 
 impl FrontEnd {
@@ -134,12 +148,14 @@ impl FrontEnd {
             odom_from_body: None,
             stamp_ns: 0,
             path_m: 0.0,
+            wheels: Wheels::default(),
             in_map: Matrix3::zeros(),
             since_place: Matrix3::zeros(),
             broken: false,
             fresh: false,
             keys: VecDeque::new(),
             open: VecDeque::new(),
+            dark: None,
             local: None,
         }
     }
@@ -167,18 +183,37 @@ impl FrontEnd {
     /// Takes a scan with the odometry at its stamp.
     pub fn scan(&mut self, stamp_ns: StampNs, odom_from_body: Pose2, sweep: Sweep) -> Placed {
         let mut frozen = Vec::new();
+        let blind = sweep.points.len() < SEEN_MIN;
         if std::mem::take(&mut self.broken) {
             let carried = stamp_ns.saturating_sub(self.stamp_ns).saturating_abs() > CARRIED_NS;
             if carried || !self.resume(&sweep) {
                 frozen = self.start_over();
             }
         } else if let Some(before) = self.odom_from_body {
-            self.predict(&before.between(&odom_from_body));
-            self.correct(&sweep);
+            let dt_s = stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9;
+            self.predict(&before.between(&odom_from_body), dt_s);
+            if !blind && (self.is_dark() || self.is_vague()) {
+                self.land();
+                frozen = self.freeze(self.path_m);
+                self.clear_local();
+            } else {
+                self.correct(&sweep);
+            }
         }
         (self.odom_from_body, self.stamp_ns) = (Some(odom_from_body), stamp_ns);
-        let began = self.keep_place(stamp_ns);
-        self.keep_key(sweep);
+        // In the dark, places begin only after some path: until then one edge spans it, and what the
+        // next scan says of it is exactly what it is worth.
+        let hold = blind && !self.open.is_empty() && self.wheels.unseen_m() < DARK_PATH_M;
+        if blind && !hold && !self.is_dark() {
+            self.go_dark();
+        }
+        let began = !hold && self.keep_place(stamp_ns);
+        if !blind {
+            self.keep_key(sweep);
+        }
+        if began {
+            self.bridge();
+        }
         frozen.extend(self.freeze(self.path_m - CONTENT_REACH_M));
         let (place, place_from_body) = self
             .open
@@ -193,6 +228,7 @@ impl FrontEnd {
         // The place held must stay, to hold the next scans.
         while self.open.front().is_some_and(|p| p.path_m <= path_m)
             && (self.open.len() > 1 || path_m == f64::INFINITY)
+            && (path_m == f64::INFINITY || self.open.front().is_none_or(|p| !self.is_held_back(p.id)))
         {
             let Some(open) = self.open.pop_front() else { break };
             let near = |k: &&Key| (k.path_m - open.path_m).abs() <= CONTENT_REACH_M;
@@ -205,16 +241,36 @@ impl FrontEnd {
             let content = Content::new(&sweeps);
             frozen.push(FrozenPlace { open, content });
         }
+        if path_m == f64::INFINITY {
+            self.dark = None;
+        }
         frozen
     }
 
-    fn predict(&mut self, increment: &Pose2) {
+    fn predict(&mut self, increment: &Pose2, dt_s: f64) {
+        let (increment, q) = self.wheels.drive(increment, dt_s);
         let f = increment.inverse().adjoint();
-        let q = increment_covariance(increment);
         self.in_map = f * self.in_map * f.transpose() + q;
         self.since_place = f * self.since_place * f.transpose() + q;
-        self.front_from_body = self.front_from_body.compose(increment);
+        self.front_from_body = self.front_from_body.compose(&increment);
         self.path_m += increment.x_m.hypot(increment.y_m);
+    }
+
+    /// Whether the robot drove on blindly until its pose in the local map was too uncertain for a
+    /// fit there to be believed.
+    fn is_vague(&self) -> bool {
+        let (d2, yaw2) = (self.in_map[(0, 0)].max(self.in_map[(1, 1)]), self.in_map[(2, 2)]);
+        self.wheels.unseen_m() > VAGUE_PATH_M && (d2 > VAGUE_M.powi(2) || yaw2 > VAGUE_RAD.powi(2))
+    }
+
+    /// Leaves the local map behind: so far along the path that none of its places is taken for part
+    /// of the new one.
+    fn clear_local(&mut self) {
+        self.keys.clear();
+        self.local = None;
+        self.path_m += 2.0 * LOCAL_PATH_M;
+        self.in_map = Matrix3::zeros();
+        self.wheels.lift();
     }
 
     /// Registers the scan to the local map around the prediction; what it says is fused.
@@ -235,6 +291,7 @@ impl FrontEnd {
         };
         self.in_map = fuse(&self.in_map).unwrap_or(self.in_map);
         self.since_place = fuse(&self.since_place).unwrap_or(self.since_place);
+        self.wheels.told(&self.front_from_body, &self.in_map);
     }
 
     fn register(&mut self, points: &[Point], prior: &Prior) -> Option<Alignment> {
@@ -272,6 +329,7 @@ impl FrontEnd {
             .max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
         let Some(found) = found.filter(|f| f.inlier_share >= SHARE_SURE) else { return false };
         self.front_from_body = found.target_from_source;
+        self.wheels.lift();
         true
     }
 
@@ -281,11 +339,7 @@ impl FrontEnd {
     fn start_over(&mut self) -> Vec<FrozenPlace> {
         let frozen = self.freeze(f64::INFINITY);
         self.fresh = true;
-        self.keys.clear();
-        self.local = None;
-        // Far enough that nothing of the old map is taken for part of the new local one.
-        self.path_m += 2.0 * LOCAL_PATH_M;
-        self.in_map = Matrix3::zeros();
+        self.clear_local();
         self.since_place = Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0));
         frozen
     }
@@ -333,23 +387,33 @@ impl FrontEnd {
         }
         self.keys.push_back(Key { front_from_body: self.front_from_body, path_m: self.path_m, sweep });
         let keep_from_m = self.path_m - LOCAL_PATH_M;
-        while self.keys.len() > KEYS_MAX || self.keys.front().is_some_and(|k| k.path_m < keep_from_m) {
-            self.keys.pop_front();
+        let gone = |keys: &VecDeque<Key>| {
+            keys.len() > KEYS_MAX || keys.front().is_some_and(|k| k.path_m < keep_from_m)
+        };
+        let mut left = Vec::new();
+        while gone(&self.keys) {
+            left.extend(self.keys.pop_front());
         }
-        self.local = None;
+        if let (Some(local), Some(new)) = (&mut self.local, self.keys.back()) {
+            local.add(&new.sweep.points, &new.front_from_body);
+            for key in left {
+                local.take_away(&key.sweep.points, &key.front_from_body);
+            }
+        }
     }
 
-    fn local(&mut self) -> &Index {
+    fn local(&mut self) -> &LocalMap {
         let keys = &self.keys;
         self.local.get_or_insert_with(|| {
-            let all: Vec<Point> = keys
-                .iter()
-                .flat_map(|k| k.sweep.points.iter().map(|p| p.moved(&k.front_from_body)))
-                .collect();
-            Index::new(&thin(&all, VOXEL_M), GATE_M)
+            let mut local = LocalMap::default();
+            for key in keys {
+                local.add(&key.sweep.points, &key.front_from_body);
+            }
+            local
         })
     }
 }
 
+mod bridge;
 #[cfg(test)]
 mod tests;

@@ -5,7 +5,9 @@
 //! - [`align`]: point-to-line registration from a guess, with an information matrix.
 //! - [`correlate`]: prior-free search for all transforms under which two clouds overlap.
 //! - [`agree`]: do two places see each other's walls, or through them?
+//! - `local`: the surfaces of the last metres of path, kept as scans come and go.
 //! - [`front`]: the front end, every scan against the recent ones.
+//! - `wheels`: online calibration of odometry, and what its increments are worth.
 //! - [`place`]: a place's matchable content, frozen when the robot has left it.
 //! - [`matching`]: two places' scans to modes; the measurement behind every loop edge.
 
@@ -14,6 +16,8 @@ pub mod align;
 pub mod cloud;
 pub mod correlate;
 pub mod front;
+mod local;
 pub mod matching;
 pub mod place;
 pub mod sweep;
+mod wheels;

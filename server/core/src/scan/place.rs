@@ -1,7 +1,7 @@
 //! A place's matchable content: the scans of the last and next few metres, frozen when the robot
 //! has left it.
 
-use super::cloud::{Point, thin};
+use super::cloud::{Point, moved, thin};
 use super::sweep::{RangeImage, Sweep};
 use crate::geometry::Pose2;
 use serde::{Deserialize, Serialize};
@@ -34,8 +34,7 @@ pub struct View {
 impl Content {
     /// From sweeps with their poses in the place's frame.
     pub fn new(sweeps: &[(Pose2, &Sweep)]) -> Self {
-        let all: Vec<Point> =
-            sweeps.iter().flat_map(|(pose, s)| s.points.iter().map(|p| p.moved(pose))).collect();
+        let all: Vec<Point> = sweeps.iter().flat_map(|(pose, s)| moved(&s.points, pose)).collect();
         let cloud = thin(&all, VOXEL_M);
         let every = sweeps.len().div_ceil(VIEWS_MAX).max(1);
         let views = sweeps

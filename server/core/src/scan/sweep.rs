@@ -132,7 +132,7 @@ fn ignored(laser: &Laser, bearing_rad: f64) -> bool {
 /// neighbourhood is not a line.
 fn normal(hits: &[Hit], k: usize, step_rad: f64) -> (f64, f64) {
     let here = &hits[k];
-    let range_m = here.x_m.hypot(here.y_m);
+    let range_m = (here.x_m * here.x_m + here.y_m * here.y_m).sqrt();
     // Three beams' spacing on a wall seen at 20° of incidence or more.
     let gap_m = NORMAL_GAP_M + 3.0 * range_m * step_rad.min(0.1);
     let (mut n, mut sx, mut sy, mut sxx, mut sxy, mut syy) = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
@@ -152,7 +152,7 @@ fn normal(hits: &[Hit], k: usize, step_rad: f64) -> (f64, f64) {
             let Some(i) = (if ahead { Some(k + step) } else { k.checked_sub(step) }) else { break };
             let Some(h) = hits.get(i) else { break };
             if h.beam.abs_diff(here.beam) > NORMAL_REACH + 1
-                || (h.x_m - last.x_m).hypot(h.y_m - last.y_m) > gap_m
+                || (h.x_m - last.x_m).powi(2) + (h.y_m - last.y_m).powi(2) > gap_m * gap_m
             {
                 break;
             }
@@ -164,7 +164,7 @@ fn normal(hits: &[Hit], k: usize, step_rad: f64) -> (f64, f64) {
         return (0.0, 0.0);
     }
     let (cxx, cxy, cyy) = (sxx - sx * sx / n, sxy - sx * sy / n, syy - sy * sy / n);
-    let (mean, half) = (f64::midpoint(cxx, cyy), ((cxx - cyy) / 2.0).hypot(cxy));
+    let (mean, half) = (f64::midpoint(cxx, cyy), ((cxx - cyy).powi(2) / 4.0 + cxy * cxy).sqrt());
     if mean + half < 1e-8 || ((mean - half).max(0.0) / (mean + half)).sqrt() > NORMAL_FLATNESS_MAX {
         return (0.0, 0.0);
     }
@@ -181,7 +181,7 @@ fn image(hits: &[Hit], laser: &Laser, step_rad: f64) -> RangeImage {
     // A beam stands for half its spacing to either side.
     let reach = ((step_rad / 2.0) * (BINS as f64 / TAU)).ceil() as usize;
     for h in hits {
-        let range = h.x_m.hypot(h.y_m) as f32;
+        let range = (h.x_m * h.x_m + h.y_m * h.y_m).sqrt() as f32;
         let centre = bin(h.y_m.atan2(h.x_m));
         for k in centre + BINS - reach.min(BINS / 2)..=centre + BINS + reach.min(BINS / 2) {
             // f32::min and max pass over NaN.
