@@ -14,7 +14,7 @@ use super::{Chain, FrontEnd, Key, OpenPlace};
 use crate::effects::PlaceId;
 use crate::geometry::Pose2;
 use crate::scan::cloud::{Index, Surfaces};
-use crate::scan::matching::{Mode, Target, refine};
+use crate::scan::matching::{Mode, index, refine};
 use crate::scan::place::Content;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -174,7 +174,7 @@ fn tie(shore: &Content, here: &Content, covariance: &Matrix3<f64>) -> Option<Mod
         (covariance + m.covariance).try_inverse().is_some_and(|s| e.dot(&(s * e)) < ALLOWED)
     };
     let good = |m: &Mode| m.score >= SCORE_MIN && m.overlap >= OVERLAP_MIN;
-    let target = Target::near(shore);
+    let target = index(shore);
     let mut fits: Vec<Mode> = guesses(shore, here, covariance)
         .iter()
         .filter_map(|guess| refine(shore, &target, here, guess))
