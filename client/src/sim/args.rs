@@ -79,6 +79,14 @@ pub enum SimulateError {
     /// The floor plan is not usable.
     #[error(transparent)]
     Plan(#[from] PlanError),
+    /// There is no tour of the floor plan.
+    #[error("{}: {source}", file.display())]
+    Tour {
+        /// The plan.
+        file: PathBuf,
+        /// Why.
+        source: SimError,
+    },
     /// The scenario can't be played.
     #[error(transparent)]
     Sim(#[from] SimError),
@@ -98,7 +106,8 @@ const SWEPT_ODOM_RATE_HZ: f64 = 20.0;
 /// The scenario asked for.
 fn scenario(args: &SimulateArgs) -> Result<Scenario, SimulateError> {
     let mut scenario = match (&args.plan, args.building) {
-        (Some(file), _) => Scenario::floor_plan(&FloorPlan::read(file)?, args.stops, args.seed)?,
+        (Some(file), _) => Scenario::floor_plan(&FloorPlan::read(file)?, args.stops, args.seed)
+            .map_err(|source| SimulateError::Tour { file: file.clone(), source })?,
         (None, Building::Demo) => Scenario::demo(args.seed),
         (None, Building::Office) => Scenario::office(&OfficeStyle::default(), args.stops, args.seed),
     };
@@ -130,4 +139,47 @@ pub fn run(args: &SimulateArgs) -> Result<String, SimulateError> {
         recording.truth.scans.len(),
         recording.truth.names.len()
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::storey::tests::{ROW, TWO_ROOMS};
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        simulate: SimulateArgs,
+    }
+
+    /// Runs with a plan in a folder of its own, gone at the end.
+    fn ran(name: &str, plan: &str, options: &str) -> Result<String, String> {
+        let folder = std::env::temp_dir().join(format!("toponym-sim-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let (file, out) = (folder.join("plan.xml"), folder.join("out"));
+        std::fs::write(&file, plan).unwrap();
+        let (file, out) = (file.display().to_string(), out.display().to_string());
+        let args = ["simulate", out.as_str(), "--plan", file.as_str(), "--stops", "3"];
+        let cli = Cli::try_parse_from(args.into_iter().chain(options.split_whitespace())).unwrap();
+        let done = run(&cli.simulate).map_err(|e| e.to_string());
+        std::fs::remove_dir_all(&folder).unwrap();
+        done
+    }
+
+    #[test]
+    fn the_last_word_names_the_log_to_map() {
+        for (options, log) in
+            [("", "sim.clf"), ("--lidar rplidar --wheels rough", "sim.rec"), ("--upside-down", "sim.rec")]
+        {
+            let said = ran("last", ROW, options).unwrap();
+            assert!(said.contains(&format!("{log}: ")), "{options}: {said}");
+        }
+    }
+
+    #[test]
+    fn a_plan_without_a_tour_is_named() {
+        let error = ran("none", TWO_ROOMS, "").unwrap_err();
+        assert!(error.contains("plan.xml: ") && error.contains("2 rooms"), "{error}");
+    }
 }

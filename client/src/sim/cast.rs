@@ -117,18 +117,36 @@ impl Buckets {
 
 #[cfg(test)]
 mod tests {
-    #[test]
-    fn buckets_change_no_range() {
-        let world = crate::sim::demo_building();
+    use super::*;
+    use crate::sim::storey::tests::two_rooms;
+    use crate::sim::{World, demo_building};
+
+    /// Casts many rays, from within and from without, against all walls.
+    fn compare(world: &World, from: Point, size_m: [f64; 2]) {
         for k in 0..2000 {
-            let origin = [f64::from(k % 47) * 0.83 - 3.0, f64::from(k % 31) * 0.77 - 5.0];
+            let at = |axis: usize, n: u32| from[axis] + f64::from(k % n) / f64::from(n) * size_m[axis];
+            let origin = [at(0, 47), at(1, 31)];
             let bearing = f64::from(k) * 0.7;
             let (s, c) = bearing.sin_cos();
             let all = world.walls.iter().filter_map(|w| w.hit(origin, [c, s]));
             let want = all.fold(f64::INFINITY, f64::min);
-            let got = world.cast(origin, bearing, 20.0).unwrap_or(f64::INFINITY);
-            let right = if want < 20.0 { (got - want).abs() < 1e-9 } else { got.is_infinite() };
-            assert!(right, "ray {k} from {origin:?}: {got}, not {want}");
+            match world.strike(origin, bearing, 20.0) {
+                Some(got) => {
+                    assert!(
+                        (got.range_m - want).abs() < 1e-9,
+                        "ray {k} from {origin:?}: {got:?}, not {want}"
+                    );
+                    let wall = world.walls[got.wall].hit(origin, [c, s]);
+                    assert!(wall.is_some_and(|m| (m - want).abs() < 1e-9), "ray {k}: another wall");
+                }
+                None => assert!(want >= 20.0, "ray {k} from {origin:?}: nothing, not {want}"),
+            }
         }
+    }
+
+    #[test]
+    fn buckets_change_no_range() {
+        compare(&demo_building(), [-8.0, -9.0], [48.0, 34.0]);
+        compare(&two_rooms().world, [-1.0, -1.0], [12.0, 6.0]);
     }
 }

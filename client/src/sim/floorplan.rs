@@ -3,10 +3,11 @@
 
 use super::geom::{Point, Segment, distance_m};
 use roxmltree::{Document, Node};
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 /// A plan larger than this has a wrong scale.
-const EXTENT_MAX_M: f64 = 1000.0;
+const EXTENT_MAX_M: f64 = 400.0;
 
 /// Why a plan can't be used.
 #[derive(Debug, thiserror::Error)]
@@ -109,9 +110,13 @@ fn plan(root: Node<'_, '_>) -> Result<FloorPlan, Wrong> {
         length => Err((scale.range().start, format!("{name} is {length}, must be above 0"))),
     };
     let unit_m = length("RealDistance")? / length("PixelDistance")?;
-    let mut spaces = Vec::new();
+    let (mut spaces, mut names) = (Vec::new(), BTreeSet::new());
     for node in root.children().filter(|n| n.has_tag_name("space")) {
         let space = space(node, unit_m)?;
+        if !names.insert(space.name.clone()) {
+            let why = format!("space {:?} comes twice: where do portals to it lead?", space.name);
+            return Err((node.range().start, why));
+        }
         if !space.contour.is_empty() {
             spaces.push(space);
         }
@@ -221,6 +226,7 @@ mod tests {
             (r#"x1="400""#, r#"x1="inf""#, "p.xml:6:", r#"x1 is "inf", must be a number"#),
             (r#"type="Wall""#, r#"type="Hedge""#, "p.xml:5:", r#"type is "Hedge", must be"#),
             (r#"<space name="a""#, "<space", "p.xml:3:", "<space> has no name"),
+            (r#"<space name="b""#, r#"<space name="a""#, "p.xml:12:", r#"space "a" comes twice"#),
         ] {
             let text = TWO_ROOMS.replacen(from, to, 1);
             assert_ne!(text, TWO_ROOMS);

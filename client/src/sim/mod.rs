@@ -54,7 +54,7 @@ pub enum SimError {
     #[error("the tour leads to room {0}, which the building does not have")]
     NoSuchRoom(usize),
     /// A floor plan has nothing to tour.
-    #[error("only {0} rooms of the plan can be visited, a tour needs 2: do its portals join its spaces?")]
+    #[error("a tour needs 2 rooms, the largest part that doors join has {0}: do portals face each other?")]
     TooSmall(usize),
     /// Two rooms are not joined by doors.
     #[error("there is no way from room {0} to room {1}")]
