@@ -6,7 +6,7 @@ use std::collections::BinaryHeap;
 
 /// Edge of a cell.
 const CELL_M: f64 = 0.1;
-/// The robot's radius and a hand's breadth: no way leads closer to a wall.
+/// No way leads closer to a wall: the robot's radius of some 0.15 m, and what it cuts off corners.
 const BODY_M: f64 = 0.24;
 /// With this much room a way takes no further heed of walls.
 const COMFORT_M: f64 = 0.6;
