@@ -3,11 +3,13 @@
 use super::doors;
 use super::floor::Floor;
 use super::floorplan::FloorPlan;
-use super::geom::{Area, Point, distance_m};
+use super::geom::{Area, Point, Segment, distance_m};
 use super::names::{Use, name_of};
 use super::random::Draw;
 use super::world::{Room, RoomKind, Surface, Ways, World};
 
+/// What a wall is made of may change from here to there: a wall dark all along is rare.
+const PATCH_M: f64 = 2.0;
 /// Share of the windows that are glass down to the laser.
 const GLASS: f64 = 0.1;
 /// Share of the walls that are dark.
@@ -34,7 +36,8 @@ impl Storey {
         let corners =
             |space: &super::floorplan::Space| space.contour.iter().map(|(line, _)| line.a).collect();
         let spaces: Vec<Area> = plan.spaces.iter().map(|s| Area { corners: corners(s) }).collect();
-        let (walls, windows): (Vec<_>, Vec<bool>) = built.lines.into_iter().unzip();
+        let patched = built.lines.iter().flat_map(|(line, window)| patches(line).map(|p| (p, *window)));
+        let (walls, windows): (Vec<_>, Vec<bool>) = patched.unzip();
         let open: Vec<Area> = spaces.iter().cloned().chain(built.doorways).collect();
         let floor = Floor::new(&open, &walls);
         let part = floor.largest_part();
@@ -61,6 +64,17 @@ impl Storey {
         world.surfaces = surfaces;
         Self { world, stops }
     }
+}
+
+/// A wall in pieces of equal length.
+fn patches(wall: &Segment) -> impl Iterator<Item = Segment> {
+    let Segment { a, b } = *wall;
+    let count = (distance_m(a, b) / PATCH_M).ceil().max(1.0);
+    let at = move |k: usize| {
+        let f = k as f64 / count;
+        [a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1])]
+    };
+    (0..count as usize).map(move |k| Segment { a: at(k), b: at(k + 1) })
 }
 
 /// The point of an area, within a part of the floor, with the most room round it; of many, one
@@ -163,6 +177,16 @@ pub(super) mod tests {
             let got = world.cast(from, f64::to_radians(deg), 30.0).unwrap();
             assert!((got - want).abs() < 1e-9, "{from:?} at {deg}°: {got}, not {want}");
         }
+    }
+
+    #[test]
+    fn patches_make_up_the_wall() {
+        let wall = Segment { a: [1.0, 0.0], b: [1.0, 5.0] };
+        let patches: Vec<Segment> = patches(&wall).collect();
+        assert_eq!(patches.len(), 3);
+        assert!(patches.windows(2).all(|w| distance_m(w[0].b, w[1].a) < 1e-12));
+        let ends_m = distance_m(patches[0].a, wall.a) + distance_m(patches[2].b, wall.b);
+        assert!(ends_m < 1e-12 && patches.iter().all(|p| distance_m(p.a, p.b) <= PATCH_M));
     }
 
     #[test]
