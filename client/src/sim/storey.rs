@@ -72,7 +72,8 @@ fn patches(wall: &Segment) -> impl Iterator<Item = Segment> {
     let count = (distance_m(a, b) / PATCH_M).ceil().max(1.0);
     let at = move |k: usize| {
         let f = k as f64 / count;
-        [a[0] + f * (b[0] - a[0]), a[1] + f * (b[1] - a[1])]
+        // At the ends exactly the wall's: no crack in the corner.
+        [0, 1].map(|axis| (1.0 - f) * a[axis] + f * b[axis])
     };
     (0..count as usize).map(move |k| Segment { a: at(k), b: at(k + 1) })
 }
