@@ -37,6 +37,7 @@ pub mod exit {
     after_help = "\
 Try, with `toponym-server serve` running in another terminal:
   toponym simulate tour                          make a log of a simulated robot
+  toponym simulate tour2 --plan FILE.xml --lidar rplidar --wheels rough --people 5
   toponym replay tour/sim.clf --narration tour/narration.jsonl --speed 20
   toponym labels                                 what was it told?
   toponym where kitchen                          how far, which way, how sure?

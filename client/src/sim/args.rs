@@ -1,26 +1,48 @@
 //! `toponym simulate`.
 
-use super::{OfficeStyle, Scenario, SimError, write};
+use super::{FloorPlan, LaserModel, OfficeStyle, PlanError, Scenario, SimError, Wheels, write};
 use std::path::PathBuf;
 
-/// Make a log of a simulated robot in a made-up building, with a narration and the truth.
+/// Make a log of a simulated robot in a building, with a narration and the truth.
 ///
-/// Writes sim.clf, narration.jsonl, truth.json and questions.json into a folder; then try
-/// `toponym-server map DIR/sim.clf --narration DIR/narration.jsonl --image map.png`.
+/// Writes into a folder: sim.rec (the robot's streams, as `serve --record` writes them), sim.clf
+/// (the same as CARMEN text, only with the front laser upright: others don't fit the format),
+/// narration.jsonl, truth.json (pose at the start of each scan, regions by name) and
+/// questions.json. Then try `toponym-server map DIR/sim.rec --narration DIR/narration.jsonl
+/// --image map.png`.
 #[derive(Clone, Debug, clap::Args)]
 pub struct SimulateArgs {
     /// Folder to write to; made if need be.
     #[arg(value_name = "DIR")]
     pub folder: PathBuf,
-    /// Seed of the building (unless it is the demo's), the wheels, the laser and the guide.
+    /// Seed of the building (unless it is the demo's or a plan), the tour, the wheels, the laser,
+    /// the people and the guide.
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
     /// Which building.
     #[arg(long, value_enum, default_value = "demo")]
     pub building: Building,
-    /// Rooms on the tour of a random office.
+    /// Instead, a floor plan in the XML format of the KTH campus data set.
+    ///
+    /// Portals that face each other are open doors, all else is wall. The tour keeps to the
+    /// largest part that open doors join.
+    #[arg(long, value_name = "FILE.xml", conflicts_with = "building")]
+    pub plan: Option<PathBuf>,
+    /// Rooms on the tour of a random office or a plan.
     #[arg(long, default_value_t = 14)]
     pub stops: usize,
+    /// Which laser.
+    #[arg(long, value_enum, default_value = "front")]
+    pub lidar: Lidar,
+    /// The laser hangs head down: its bearings run clockwise.
+    #[arg(long)]
+    pub upside_down: bool,
+    /// How well the wheels measure.
+    #[arg(long, value_enum, default_value = "fair")]
+    pub wheels: WheelsKind,
+    /// People walking about, whose legs the laser sees; the first is the guide, ahead of the robot.
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    pub people: usize,
 }
 
 /// Which building to simulate.
@@ -32,9 +54,39 @@ pub enum Building {
     Office,
 }
 
+/// Which laser to simulate.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Lidar {
+    /// Half a circle ahead in whole degrees, at once, 20 m.
+    Front,
+    /// A full circle in 715 to 725 rays, swept ten times a second, 12 m, mounted backwards, with a
+    /// post of the robot in its way.
+    Rplidar,
+}
+
+/// How well the wheels measure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum WheelsKind {
+    /// 1 % too far, 1 % too wide, noise of 0.7° after a metre.
+    Fair,
+    /// Noise of 5 % and 2° after a metre, of 5 % after a radian, and 0.25° per metre to the left.
+    Rough,
+}
+
 /// A simulated log could not be made.
 #[derive(Debug, thiserror::Error)]
 pub enum SimulateError {
+    /// The floor plan is not usable.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// There is no tour of the floor plan.
+    #[error("{}: {source}", file.display())]
+    Tour {
+        /// The plan.
+        file: PathBuf,
+        /// Why.
+        source: SimError,
+    },
     /// The scenario can't be played.
     #[error(transparent)]
     Sim(#[from] SimError),
@@ -48,20 +100,86 @@ pub enum SimulateError {
     },
 }
 
+/// Odometry messages per second beside a laser that sweeps: the server deskews by them.
+const SWEPT_ODOM_RATE_HZ: f64 = 20.0;
+
+/// The scenario asked for.
+fn scenario(args: &SimulateArgs) -> Result<Scenario, SimulateError> {
+    let mut scenario = match (&args.plan, args.building) {
+        (Some(file), _) => Scenario::floor_plan(&FloorPlan::read(file)?, args.stops, args.seed)
+            .map_err(|source| SimulateError::Tour { file: file.clone(), source })?,
+        (None, Building::Demo) => Scenario::demo(args.seed),
+        (None, Building::Office) => Scenario::office(&OfficeStyle::default(), args.stops, args.seed),
+    };
+    if args.lidar == Lidar::Rplidar {
+        scenario.lasers = vec![LaserModel::rplidar()];
+        scenario.odom_rate_hz = SWEPT_ODOM_RATE_HZ;
+    }
+    for laser in &mut scenario.lasers {
+        laser.mount.upside_down = args.upside_down;
+    }
+    if args.wheels == WheelsKind::Rough {
+        scenario.wheels = Wheels::rough();
+    }
+    scenario.people = args.people;
+    Ok(scenario)
+}
+
 /// Runs `toponym simulate`; the text says what was made.
 pub fn run(args: &SimulateArgs) -> Result<String, SimulateError> {
-    let scenario = match args.building {
-        Building::Demo => Scenario::demo(args.seed),
-        Building::Office => Scenario::office(&OfficeStyle::default(), args.stops, args.seed),
-    };
-    let recording = scenario.run()?;
+    let recording = scenario(args)?.run()?;
     let folder = args.folder.clone();
-    write::write_folder(&recording, &folder).map_err(|source| SimulateError::Write { folder, source })?;
+    let log =
+        write::write_folder(&recording, &folder).map_err(|source| SimulateError::Write { folder, source })?;
+    let minutes = recording.truth.scans.last().map_or(0.0, |(stamp, _)| stamp.seconds() / 60.0);
     Ok(format!(
-        "{}: {:.0} m driven, {} scans, {} rooms named",
-        args.folder.join("sim.clf").display(),
+        "{}: {:.0} m driven in {minutes:.0} min, {} scans, {} rooms named",
+        args.folder.join(log).display(),
         recording.truth.path_m,
         recording.truth.scans.len(),
         recording.truth.names.len()
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::storey::tests::{ROW, TWO_ROOMS};
+    use super::*;
+    use clap::Parser;
+
+    #[derive(Parser)]
+    struct Cli {
+        #[command(flatten)]
+        simulate: SimulateArgs,
+    }
+
+    /// Runs with a plan in a folder of its own, gone at the end.
+    fn ran(name: &str, plan: &str, options: &str) -> Result<String, String> {
+        let folder = std::env::temp_dir().join(format!("toponym-sim-{name}-{}", std::process::id()));
+        std::fs::create_dir_all(&folder).unwrap();
+        let (file, out) = (folder.join("plan.xml"), folder.join("out"));
+        std::fs::write(&file, plan).unwrap();
+        let (file, out) = (file.display().to_string(), out.display().to_string());
+        let args = ["simulate", out.as_str(), "--plan", file.as_str(), "--stops", "3"];
+        let cli = Cli::try_parse_from(args.into_iter().chain(options.split_whitespace())).unwrap();
+        let done = run(&cli.simulate).map_err(|e| e.to_string());
+        std::fs::remove_dir_all(&folder).unwrap();
+        done
+    }
+
+    #[test]
+    fn the_last_word_names_the_log_to_map() {
+        for (options, log) in
+            [("", "sim.clf"), ("--lidar rplidar --wheels rough", "sim.rec"), ("--upside-down", "sim.rec")]
+        {
+            let said = ran("last", ROW, options).unwrap();
+            assert!(said.contains(&format!("{log}: ")), "{options}: {said}");
+        }
+    }
+
+    #[test]
+    fn a_plan_without_a_tour_is_named() {
+        let error = ran("none", TWO_ROOMS, "").unwrap_err();
+        assert!(error.contains("plan.xml: ") && error.contains("2 rooms"), "{error}");
+    }
 }

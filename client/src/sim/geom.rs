@@ -67,6 +67,12 @@ impl Segment {
         distance_m(p, [self.a[0] + along * d[0], self.a[1] + along * d[1]])
     }
 
+    /// Angle between a direction and the segment's normal, 0 to π/2.
+    pub fn incidence_rad(&self, direction_rad: f64) -> f64 {
+        let along_rad = (self.b[1] - self.a[1]).atan2(self.b[0] - self.a[0]);
+        (direction_rad - along_rad).sin().abs().min(1.0).acos()
+    }
+
     /// Smallest distance between two segments; 0 where they cross.
     pub fn gap_m(&self, other: &Self) -> f64 {
         let direction = [other.b[0] - other.a[0], other.b[1] - other.a[1]];
@@ -131,6 +137,53 @@ impl Rect {
     }
 }
 
+/// A part of the floor: its corners in order round it, at least three, metres.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Area {
+    /// Corners; the last joins the first.
+    pub corners: Vec<Point>,
+}
+
+impl From<Rect> for Area {
+    fn from(rect: Rect) -> Self {
+        Self { corners: rect.corners().into() }
+    }
+}
+
+impl Area {
+    /// Its edges.
+    pub fn edges(&self) -> impl Iterator<Item = Segment> + '_ {
+        let next = self.corners.iter().cycle().skip(1);
+        self.corners.iter().zip(next).map(|(&a, &b)| Segment { a, b })
+    }
+
+    /// Lower left and upper right corner of the upright box round it.
+    pub fn bounds(&self) -> [Point; 2] {
+        let nothing = [[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]];
+        self.corners.iter().fold(nothing, |[low, high], c| {
+            [[low[0].min(c[0]), low[1].min(c[1])], [high[0].max(c[0]), high[1].max(c[1])]]
+        })
+    }
+
+    /// Middle of the upright box round it.
+    pub fn centre(&self) -> Point {
+        let [low, high] = self.bounds();
+        [f64::midpoint(low[0], high[0]), f64::midpoint(low[1], high[1])]
+    }
+
+    /// Whether a point lies at least `margin_m` inside.
+    pub fn contains(&self, p: Point, margin_m: f64) -> bool {
+        let crossings = self.edges().filter(|e| crossing_x(e, p[1]).is_some_and(|x| x > p[0])).count();
+        crossings % 2 == 1 && (margin_m <= 0.0 || self.edges().all(|e| e.distance_m(p) >= margin_m))
+    }
+}
+
+/// Where a segment crosses the level `y`; its lower end belongs to it, its upper end does not.
+pub fn crossing_x(segment: &Segment, y: f64) -> Option<f64> {
+    let (a, b) = (segment.a, segment.b);
+    ((a[1] <= y) != (b[1] <= y)).then(|| a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0]))
+}
+
 /// The walls round a floor that is the union of rectangles: the edges of each that no other one
 /// continues.
 pub fn outline(free: &[Rect]) -> Vec<Segment> {
@@ -162,7 +215,7 @@ pub fn outline(free: &[Rect]) -> Vec<Segment> {
 }
 
 /// The pieces of `[from, to]` outside all intervals.
-fn uncovered(from: f64, to: f64, mut intervals: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+pub(super) fn uncovered(from: f64, to: f64, mut intervals: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     intervals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut pieces = Vec::new();
     let mut start = from;
@@ -201,6 +254,22 @@ mod tests {
         let s = Segment { a: [0.0, 0.0], b: [2.0, 0.0] };
         assert!(s.gap_m(&Segment { a: [1.0, -1.0], b: [1.0, 1.0] }) < 1e-12);
         assert!((s.gap_m(&Segment { a: [0.0, 0.5], b: [2.0, 0.5] }) - 0.5).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_area_with_a_bay_contains_what_lies_in_it() {
+        let l =
+            Area { corners: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 1.0], [1.0, 1.0], [1.0, 3.0], [0.0, 3.0]] };
+        for (p, margin_m, inside) in [
+            ([0.5, 2.5], 0.0, true),
+            ([2.0, 2.0], 0.0, false),
+            ([3.0, 0.5], 0.4, true),
+            ([3.0, 0.5], 0.6, false),
+            ([-1.0, 0.5], 0.0, false),
+        ] {
+            assert_eq!(l.contains(p, margin_m), inside, "{p:?} by {margin_m} m");
+        }
+        assert!(distance_m(l.centre(), [2.0, 1.5]) < 1e-12);
     }
 
     #[test]

@@ -4,8 +4,6 @@ use super::random::Draw;
 use super::robot::Drive;
 use super::world::{RoomKind, World};
 
-/// A visit begins this far inside a room, metres.
-const INSIDE_M: f64 = 0.8;
 /// Time step at which the guide looks where they are.
 const LOOK_S: f64 = 0.2;
 /// A walk along a corridor shorter than this is not worth a word.
@@ -81,7 +79,7 @@ impl<'a> Tour<'a> {
             RoomKind::Room => style.named,
             RoomKind::Corridor => style.corridors,
         };
-        let named = world.rooms.iter().map(|r| draw.chance(share(r.kind))).collect();
+        let named = world.rooms.iter().map(|r| draw.chance(share(r.kind)) && !r.name.is_empty()).collect();
         let none = vec![false; world.rooms.len()];
         Self { world, style, named, told: none.clone(), announced: none }
     }
@@ -154,7 +152,7 @@ fn visits(world: &World, drive: &Drive) -> Vec<Visit> {
         let inside = |room: &usize| {
             let r = &world.rooms[*room];
             // In a corridor, too, one is soon in the middle: its walls are near on both sides.
-            r.area.contains([pose.x_m, pose.y_m], INSIDE_M)
+            r.area.contains([pose.x_m, pose.y_m], r.inside_m)
         };
         let kind =
             |wanted: RoomKind| (0..world.rooms.len()).filter(inside).find(|&r| world.rooms[r].kind == wanted);
@@ -195,7 +193,7 @@ mod tests {
         );
         for (sentence, name) in said.iter().zip(["gym", "kitchen", "gym"]) {
             let pose = drive.at(sentence.began_s);
-            let area = world.rooms[world.room(name).unwrap()].area;
+            let area = &world.rooms[world.room(name).unwrap()].area;
             assert!(area.contains([pose.x_m, pose.y_m], 0.0), "{sentence:?}");
         }
     }

@@ -9,24 +9,40 @@
 
 pub mod args;
 mod building;
+mod cast;
+mod doors;
+mod floor;
+mod floorplan;
+mod follow;
 pub mod geom;
 mod guide;
 mod laser;
+mod names;
+mod people;
 mod random;
 mod robot;
+mod storey;
+mod tours;
 mod world;
 pub mod write;
 
 pub use building::{OfficeStyle, demo_building, random_office};
+pub use cast::Strike;
+pub use floorplan::{Edge, FloorPlan, PlanError, Space};
 pub use guide::{GuideStyle, Sentence};
-pub use laser::LaserModel;
+pub use laser::{LaserModel, Post, Scene, Sweep};
+pub use people::People;
 pub use random::Draw;
 pub use robot::{Drive, Motion, Wheels};
-pub use world::{Plan, Room, RoomKind, World};
+pub use storey::Storey;
+pub use world::{Plan, Room, RoomKind, Surface, World};
 
 use geom::Point;
 use toponym_proto::merge::{Sentences, order_stamp};
 use toponym_proto::{Clock, End, Header, Message, Odom, Pose, Say, Scan, Setup, Stamp};
+
+/// Purpose of the people's draws, far from those of the lasers, which are counted.
+const PEOPLE: u64 = 1000;
 
 /// A scenario that can't be played.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -37,6 +53,9 @@ pub enum SimError {
     /// The tour leads to a room that is not there.
     #[error("the tour leads to room {0}, which the building does not have")]
     NoSuchRoom(usize),
+    /// A floor plan has nothing to tour.
+    #[error("a tour needs 2 rooms, the largest part that doors join has {0}: do portals face each other?")]
+    TooSmall(usize),
     /// Two rooms are not joined by doors.
     #[error("there is no way from room {0} to room {1}")]
     NoWay(usize, usize),
@@ -57,6 +76,8 @@ pub struct Scenario {
     pub odom_rate_hz: f64,
     /// Its lasers.
     pub lasers: Vec<LaserModel>,
+    /// People walking about, the guide among them; 0: they leave no trace in the scans.
+    pub people: usize,
     /// What the guide says.
     pub guide: GuideStyle,
     /// Robot id in the messages.
@@ -68,63 +89,6 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    /// The tour of the demo: round the building, back through the first lobby, and to the gym
-    /// again.
-    pub fn demo(seed: u64) -> Self {
-        let world = demo_building();
-        let stops = [
-            "elevator lobby",
-            "gym",
-            "kitchen",
-            "lecture hall",
-            "mail room",
-            "",
-            "cafe",
-            "library",
-            "workshop",
-            "elevator lobby",
-            "gym",
-            "kitchen",
-        ];
-        // The second lobby bears the first one's name: it is the last room so called.
-        let other_lobby = world.rooms.iter().rposition(|r| r.name == "elevator lobby");
-        let tour = stops
-            .iter()
-            .filter_map(|name| if name.is_empty() { other_lobby } else { world.room(name) })
-            .collect();
-        let mut scenario = Self::new(world, tour, seed);
-        scenario.motion.speed_mps = (0.8, 1.0);
-        scenario.guide = GuideStyle { named: 1.0, revisits: 1.0, foretold: 0.4, corridors: 1.0 };
-        scenario
-    }
-
-    /// A random office and a tour of `stops` rooms: mostly round in one direction, at times back
-    /// to where it was before.
-    pub fn office(style: &OfficeStyle, stops: usize, seed: u64) -> Self {
-        let world = random_office(style, seed);
-        let mut draw = Draw::new(seed, 2);
-        let mut order: Vec<usize> =
-            (0..world.rooms.len()).filter(|&k| world.rooms[k].kind == RoomKind::Room).collect();
-        let middle = centre(&world);
-        let bearing = |k: &usize| {
-            let [x, y] = world.rooms[*k].area.centre();
-            (y - middle[1]).atan2(x - middle[0])
-        };
-        order.sort_by(|a, b| bearing(a).total_cmp(&bearing(b)));
-        let mut tour: Vec<usize> = vec![0];
-        let mut next = draw.below(order.len());
-        while tour.len() < stops && !order.is_empty() {
-            if tour.len() > 4 && draw.chance(0.2) {
-                tour.push(tour[1 + draw.below(tour.len() - 3)]);
-            } else {
-                next += 1 + draw.below(2);
-                tour.push(order[next % order.len()]);
-            }
-        }
-        tour.dedup();
-        Self::new(world, tour, seed)
-    }
-
     /// A tour of a building with every setting on its default.
     pub fn new(world: World, tour: Vec<usize>, seed: u64) -> Self {
         Self {
@@ -134,6 +98,7 @@ impl Scenario {
             wheels: Wheels::default(),
             odom_rate_hz: 10.0,
             lasers: vec![LaserModel::default()],
+            people: 0,
             guide: GuideStyle::default(),
             robot: "sim".into(),
             map: "main".into(),
@@ -146,6 +111,8 @@ impl Scenario {
         let draw = |purpose: u64| Draw::new(self.seed, 16 + purpose);
         let drive = robot::drive(&self.world, &self.tour, &self.motion, &mut draw(0))?;
         let odometry = drive.measured(&self.wheels, &mut draw(1));
+        let people = People::walking(&self.world, &drive, self.people, &mut draw(PEOPLE))?;
+        let scene = Scene { world: &self.world, drive: &drive, people: &people };
         let said = guide::narrate(&self.world, &drive, &self.guide, &mut draw(2));
         let mut timed = vec![(0.0, self.setup())];
         for t_s in ticks(drive.duration_s(), self.odom_rate_hz) {
@@ -156,7 +123,7 @@ impl Scenario {
             let mut draw = draw(purpose);
             for t_s in ticks(drive.duration_s() - laser.sweep_s, laser.rate_hz) {
                 // A sweep is sent when it is complete.
-                timed.push((t_s + laser.sweep_s, self.scan(t_s, laser, &drive, &mut draw)));
+                timed.push((t_s + laser.sweep_s, self.scan(t_s, laser, &scene, &mut draw)));
                 scans.push((Stamp::from_seconds(t_s), drive.at(t_s)));
             }
         }
@@ -184,14 +151,15 @@ impl Scenario {
         Message::Odom(Odom { header: self.header(t_s), odom_from_body: odometry.at(t_s) })
     }
 
-    fn scan(&self, t_s: f64, laser: &LaserModel, drive: &Drive, draw: &mut Draw) -> Message {
+    fn scan(&self, t_s: f64, laser: &LaserModel, scene: &Scene<'_>, draw: &mut Draw) -> Message {
+        let sweep = laser.sweep(scene, t_s, draw);
         Message::Scan(Scan {
             header: self.header(t_s),
             laser: laser.mount.id.clone(),
             angle_min_rad: laser.angle_min_rad(),
-            angle_increment_rad: laser.angle_increment_rad(),
-            time_increment_s: laser.time_increment_s(),
-            ranges_m: laser.sweep(&self.world, drive, t_s, draw),
+            angle_increment_rad: sweep.angle_increment_rad,
+            time_increment_s: sweep.time_increment_s,
+            ranges_m: sweep.ranges_m,
         })
     }
 
@@ -226,10 +194,10 @@ impl Scenario {
     }
 
     /// The rooms that were spoken of.
-    fn names(&self, said: &[Sentence]) -> Vec<(String, [Point; 4])> {
-        let spoken = |name: &str| said.iter().any(|s| s.text.contains(name));
+    fn names(&self, said: &[Sentence]) -> Vec<(String, Vec<Point>)> {
+        let spoken = |name: &str| !name.is_empty() && said.iter().any(|s| s.text.contains(name));
         let rooms = self.world.rooms.iter().filter(|r| spoken(&r.name));
-        rooms.map(|r| (r.name.clone(), r.area.corners())).collect()
+        rooms.map(|r| (r.name.clone(), r.area.corners.clone())).collect()
     }
 }
 
@@ -247,8 +215,8 @@ pub struct Recording {
 pub struct Truth {
     /// The body's pose at each scan's stamp, in order of stamps.
     pub scans: Vec<(Stamp, Pose)>,
-    /// Every name spoken, with the corners of each room that bears it, counter-clockwise.
-    pub names: Vec<(String, [Point; 4])>,
+    /// Every name spoken, with the corners of each room that bears it, in order round it.
+    pub names: Vec<(String, Vec<Point>)>,
     /// Pose at the start: the origin of the odometry frame.
     pub start: Pose,
     /// Way driven, metres.
@@ -258,12 +226,6 @@ pub struct Truth {
 fn ticks(duration_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
     let n = if rate_hz > 0.0 && duration_s >= 0.0 { (duration_s * rate_hz) as usize + 1 } else { 0 };
     (0..n).map(move |k| k as f64 / rate_hz)
-}
-
-fn centre(world: &World) -> Point {
-    let n = world.rooms.len().max(1) as f64;
-    let sum = world.rooms.iter().map(|r| r.area.centre()).fold([0.0, 0.0], |s, c| [s[0] + c[0], s[1] + c[1]]);
-    [sum[0] / n, sum[1] / n]
 }
 
 fn header_mut(message: &mut Message) -> Option<&mut Header> {

@@ -1,13 +1,15 @@
 //! A floor of a building: walls to range against, rooms with names, ways to walk.
 
-use super::geom::{Point, Rect, Segment, distance_m, outline};
+use super::cast::{Buckets, Strike};
+use super::floor::Floor;
+use super::geom::{Area, Point, Rect, Segment, distance_m, outline};
 
 /// Body radius and a margin: a way keeps this far from every wall.
 const CLEARANCE_M: f64 = 0.32;
+/// A visit to a room begins this far inside.
+const INSIDE_M: f64 = 0.8;
 /// Ways longer than this are left to the waypoints in between.
 const WAY_MAX_M: f64 = 9.0;
-/// Edge of a ray caster's bucket.
-const BUCKET_M: f64 = 0.5;
 
 /// What a room is to a visitor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,12 +23,14 @@ pub enum RoomKind {
 /// A named part of the floor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Room {
-    /// What people call it.
+    /// What people call it; empty if nobody calls it anything.
     pub name: String,
     /// Its floor.
-    pub area: Rect,
+    pub area: Area,
     /// What it is.
     pub kind: RoomKind,
+    /// A visitor counts as inside from this far off its outline on, metres.
+    pub inside_m: f64,
     /// Where a visitor stops, as an index into [`World::waypoints`].
     pub spot: usize,
 }
@@ -106,14 +110,35 @@ impl Plan {
             .into_iter()
             .map(|(name, area, kind, spot)| {
                 waypoints.push(spot);
-                Room { name, area, kind, spot: waypoints.len() - 1 }
+                let (area, spot) = (area.into(), waypoints.len() - 1);
+                Room { name, area, kind, inside_m: INSIDE_M, spot }
             })
             .collect();
         waypoints.extend(self.waypoints);
-        let ways = find_ways(&waypoints, &walls);
-        let buckets = Buckets::new(&walls);
-        World { walls, rooms, waypoints, ways, buckets }
+        let ways = Ways::Seen(find_ways(&waypoints, &walls));
+        World::new(walls, rooms, waypoints, ways)
     }
+}
+
+/// What a wall does to a laser's ray.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Surface {
+    /// Sends it back.
+    #[default]
+    Plain,
+    /// Sends it back from near only.
+    Dark,
+    /// Sends it back only where it strikes squarely.
+    Glass,
+}
+
+/// How one gets from waypoint to waypoint.
+#[derive(Clone, Debug)]
+pub(super) enum Ways {
+    /// Straight between waypoints; per waypoint those in reach, with their distances in metres.
+    Seen(Vec<Vec<(usize, f64)>>),
+    /// Anywhere over the free floor.
+    Open(Floor),
 }
 
 /// A floor of a building.
@@ -121,18 +146,30 @@ impl Plan {
 pub struct World {
     /// Everything that stops a ray.
     pub walls: Vec<Segment>,
+    /// What they are made of; missing: plain.
+    pub surfaces: Vec<Surface>,
     /// Named parts of the floor.
     pub rooms: Vec<Room>,
     /// Points to walk by.
     pub waypoints: Vec<Point>,
-    /// Per waypoint: those in reach, with their distances in metres.
-    ways: Vec<Vec<(usize, f64)>>,
+    ways: Ways,
     buckets: Buckets,
 }
 
 impl World {
+    /// A floor of plain walls.
+    pub(super) fn new(walls: Vec<Segment>, rooms: Vec<Room>, waypoints: Vec<Point>, ways: Ways) -> Self {
+        let buckets = Buckets::new(&walls);
+        Self { walls, surfaces: Vec::new(), rooms, waypoints, ways, buckets }
+    }
+
     /// Range of a ray; none if nothing stops it within `range_max_m`.
     pub fn cast(&self, origin: Point, bearing_rad: f64, range_max_m: f64) -> Option<f64> {
+        Some(self.strike(origin, bearing_rad, range_max_m)?.range_m)
+    }
+
+    /// Where a ray meets the first wall; none if nothing stops it within `range_max_m`.
+    pub fn strike(&self, origin: Point, bearing_rad: f64, range_max_m: f64) -> Option<Strike> {
         self.buckets.cast(&self.walls, origin, bearing_rad, range_max_m)
     }
 
@@ -141,43 +178,59 @@ impl World {
         self.walls.iter().map(|w| w.distance_m(p)).fold(f64::INFINITY, f64::min)
     }
 
+    /// The free floor, where ways are not bound to waypoints.
+    pub(super) fn floor(&self) -> Option<&Floor> {
+        match &self.ways {
+            Ways::Seen(_) => None,
+            Ways::Open(floor) => Some(floor),
+        }
+    }
+
     /// Index of the first room of that name.
     pub fn room(&self, name: &str) -> Option<usize> {
         self.rooms.iter().position(|r| r.name == name)
     }
 
-    /// The shortest walk between two waypoints, both included; none if there is no way.
+    /// A short walk between two waypoints, both included; none if there is no way.
     pub fn route(&self, from: usize, to: usize) -> Option<Vec<Point>> {
-        // Dijkstra in O(n²): a floor has a few hundred waypoints.
-        let n = self.waypoints.len();
-        let (mut cost_m, mut before, mut done) = (vec![f64::INFINITY; n], vec![n; n], vec![false; n]);
-        *cost_m.get_mut(from)? = 0.0;
-        while let Some(at) = (0..n).filter(|&k| !done[k]).min_by(|&a, &b| cost_m[a].total_cmp(&cost_m[b])) {
-            if cost_m[at].is_infinite() {
-                return None;
-            }
-            if at == to {
-                break;
-            }
-            done[at] = true;
-            for &(next, way_m) in &self.ways[at] {
-                // Each leg costs a little extra, so that straight walks beat zigzags.
-                let through = cost_m[at] + way_m + 0.2;
-                if through < cost_m[next] {
-                    cost_m[next] = through;
-                    before[next] = at;
-                }
-            }
+        match &self.ways {
+            Ways::Seen(ways) => seen_route(&self.waypoints, ways, from, to),
+            Ways::Open(floor) => floor.route(*self.waypoints.get(from)?, *self.waypoints.get(to)?),
         }
-        let mut route = vec![*self.waypoints.get(to)?];
-        let mut at = to;
-        while at != from {
-            at = before[at];
-            route.push(*self.waypoints.get(at)?);
-        }
-        route.reverse();
-        Some(route)
     }
+}
+
+/// The shortest walk from waypoint to waypoint.
+fn seen_route(waypoints: &[Point], ways: &[Vec<(usize, f64)>], from: usize, to: usize) -> Option<Vec<Point>> {
+    // Dijkstra in O(n²): a floor has a few hundred waypoints.
+    let n = waypoints.len();
+    let (mut cost_m, mut before, mut done) = (vec![f64::INFINITY; n], vec![n; n], vec![false; n]);
+    *cost_m.get_mut(from)? = 0.0;
+    while let Some(at) = (0..n).filter(|&k| !done[k]).min_by(|&a, &b| cost_m[a].total_cmp(&cost_m[b])) {
+        if cost_m[at].is_infinite() {
+            return None;
+        }
+        if at == to {
+            break;
+        }
+        done[at] = true;
+        for &(next, way_m) in &ways[at] {
+            // Each leg costs a little extra, so that straight walks beat zigzags.
+            let through = cost_m[at] + way_m + 0.2;
+            if through < cost_m[next] {
+                cost_m[next] = through;
+                before[next] = at;
+            }
+        }
+    }
+    let mut route = vec![*waypoints.get(to)?];
+    let mut at = to;
+    while at != from {
+        at = before[at];
+        route.push(*waypoints.get(at)?);
+    }
+    route.reverse();
+    Some(route)
 }
 
 fn find_ways(waypoints: &[Point], walls: &[Segment]) -> Vec<Vec<(usize, f64)>> {
@@ -193,98 +246,6 @@ fn find_ways(waypoints: &[Point], walls: &[Segment]) -> Vec<Vec<(usize, f64)>> {
         }
     }
     ways
-}
-
-/// Walls sorted into square buckets: a ray looks only at those along its way.
-#[derive(Clone, Debug, Default)]
-struct Buckets {
-    origin: Point,
-    columns: usize,
-    rows: usize,
-    /// Wall indices per bucket, row-major.
-    walls: Vec<Vec<u32>>,
-}
-
-impl Buckets {
-    fn new(walls: &[Segment]) -> Self {
-        let ends = || walls.iter().flat_map(|w| [w.a, w.b]);
-        let low = |k: usize| ends().map(|p| p[k]).fold(f64::INFINITY, f64::min) - BUCKET_M;
-        let high = |k: usize| ends().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max) + BUCKET_M;
-        if walls.is_empty() {
-            return Self::default();
-        }
-        let origin = [low(0), low(1)];
-        let columns = ((high(0) - origin[0]) / BUCKET_M).ceil() as usize;
-        let rows = ((high(1) - origin[1]) / BUCKET_M).ceil() as usize;
-        let mut buckets = Self { origin, columns, rows, walls: vec![Vec::new(); columns * rows] };
-        for (index, wall) in walls.iter().enumerate() {
-            let (low, high) = (buckets.corner(wall, f64::min, -0.1), buckets.corner(wall, f64::max, 0.1));
-            for row in low[1]..=high[1] {
-                for column in low[0]..=high[0] {
-                    // Half a diagonal round the middle: a superset of the buckets crossed.
-                    let middle = [
-                        origin[0] + (column as f64 + 0.5) * BUCKET_M,
-                        origin[1] + (row as f64 + 0.5) * BUCKET_M,
-                    ];
-                    if wall.distance_m(middle) <= 0.72 * BUCKET_M {
-                        buckets.walls[row * columns + column].push(index as u32);
-                    }
-                }
-            }
-        }
-        buckets
-    }
-
-    /// First or last bucket a wall may touch; `margin`, in buckets, because a wall may lie on a
-    /// border, where rounding decides.
-    fn corner(&self, wall: &Segment, pick: fn(f64, f64) -> f64, margin: f64) -> [usize; 2] {
-        let index = |k: usize, n: usize| {
-            let at = (pick(wall.a[k], wall.b[k]) - self.origin[k]) / BUCKET_M + margin;
-            (at.max(0.0) as usize).min(n - 1)
-        };
-        [index(0, self.columns), index(1, self.rows)]
-    }
-
-    /// Walks the buckets along the ray and takes the first wall met.
-    fn cast(&self, walls: &[Segment], origin: Point, bearing_rad: f64, max_m: f64) -> Option<f64> {
-        let (s, c) = bearing_rad.sin_cos();
-        let direction = [c, s];
-        let start = [0, 1].map(|k| (origin[k] - self.origin[k]) / BUCKET_M);
-        let size = [self.columns as i64, self.rows as i64];
-        let mut cell = start.map(|v| v.floor() as i64);
-        let step = direction.map(|d| if d < 0.0 { -1 } else { 1 });
-        // Ray length to the next bucket border, and from border to border, per axis.
-        let mut border_m = [0, 1].map(|k| {
-            let next = if step[k] > 0 { cell[k] as f64 + 1.0 } else { cell[k] as f64 };
-            if direction[k] == 0.0 { f64::INFINITY } else { (next - start[k]) * BUCKET_M / direction[k] }
-        });
-        let delta_m = direction.map(|d| BUCKET_M / d.abs());
-        loop {
-            let axis = usize::from(border_m[1] < border_m[0]);
-            let leaves_m = border_m[axis];
-            if cell.iter().zip(size).all(|(&k, n)| (0..n).contains(&k)) {
-                let nearest = self.walls[cell[1] as usize * self.columns + cell[0] as usize]
-                    .iter()
-                    .filter_map(|&w| walls[w as usize].hit(origin, direction))
-                    .fold(f64::INFINITY, f64::min);
-                if nearest <= leaves_m {
-                    return (nearest < max_m).then_some(nearest);
-                }
-            } else if self.leaves_for_good(cell, step) {
-                return None;
-            }
-            if leaves_m >= max_m {
-                return None;
-            }
-            cell[axis] += step[axis];
-            border_m[axis] += delta_m[axis];
-        }
-    }
-
-    fn leaves_for_good(&self, cell: [i64; 2], step: [i64; 2]) -> bool {
-        let past = |k: usize, n: usize| if step[k] > 0 { cell[k] >= n as i64 } else { cell[k] < 0 };
-        past(0, self.columns) || past(1, self.rows)
-    }
 }
 
 #[cfg(test)]
@@ -318,21 +279,6 @@ mod tests {
         assert_eq!(cast(-3.0, 6.0, 90.0), None, "outside, looking away");
         let outside = cast(-3.0, 1.0, 0.0).unwrap();
         assert!((outside - 3.0).abs() < 1e-9, "outside, looking in");
-    }
-
-    #[test]
-    fn buckets_change_no_range() {
-        let world = crate::sim::demo_building();
-        for k in 0..2000 {
-            let origin = [f64::from(k % 47) * 0.83 - 3.0, f64::from(k % 31) * 0.77 - 5.0];
-            let bearing = f64::from(k) * 0.7;
-            let (s, c) = bearing.sin_cos();
-            let all = world.walls.iter().filter_map(|w| w.hit(origin, [c, s]));
-            let want = all.fold(f64::INFINITY, f64::min);
-            let got = world.cast(origin, bearing, 20.0).unwrap_or(f64::INFINITY);
-            let right = if want < 20.0 { (got - want).abs() < 1e-9 } else { got.is_infinite() };
-            assert!(right, "ray {k} from {origin:?}: {got}, not {want}");
-        }
     }
 
     #[test]

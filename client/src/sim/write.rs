@@ -1,25 +1,69 @@
-//! A recording as files: a CARMEN log, a narration, and the truth to score against.
+//! A recording as files: a record file, a CARMEN log where its laser fits in one, a narration, and
+//! the truth to score against.
 
 use super::Recording;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
+use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
+use toponym_proto::record::RecordWriter;
 use toponym_proto::{Message, Scan};
 
 /// What CARMEN logs write where nothing was seen.
 const NOTHING_SEEN_M: f32 = 81.83;
 
-/// Writes `sim.clf`, `narration.jsonl`, `truth.json` and `questions.json` into a folder, which it
-/// makes if need be.
-pub fn write_folder(recording: &Recording, folder: &Path) -> io::Result<()> {
+/// The robot's streams in a record file.
+pub const RECORD: &str = "sim.rec";
+/// The robot's streams as CARMEN text.
+pub const CARMEN: &str = "sim.clf";
+
+/// Writes `sim.rec`, `sim.clf` (only for a laser that CARMEN logs can tell of), `narration.jsonl`,
+/// `truth.json` and `questions.json` into a folder, which it makes if need be. The answer is the
+/// log to map: the CARMEN one if there is one.
+pub fn write_folder(recording: &Recording, folder: &Path) -> io::Result<&'static str> {
     std::fs::create_dir_all(folder)?;
-    std::fs::write(folder.join("sim.clf"), carmen(recording))?;
+    record(recording, std::fs::File::create(folder.join(RECORD))?)?;
+    let log = if fits_carmen(recording) { CARMEN } else { RECORD };
+    if log == CARMEN {
+        std::fs::write(folder.join(CARMEN), carmen(recording))?;
+    } else if folder.join(CARMEN).exists() {
+        // A run before this one left it: it would pass for this one's.
+        std::fs::remove_file(folder.join(CARMEN))?;
+    }
     std::fs::write(folder.join("narration.jsonl"), narration(recording))?;
     let (truth, questions) = truth(recording);
     std::fs::write(folder.join("truth.json"), format!("{truth}\n"))?;
-    std::fs::write(folder.join("questions.json"), format!("{questions:#}\n"))
+    std::fs::write(folder.join("questions.json"), format!("{questions:#}\n"))?;
+    Ok(log)
+}
+
+/// Writes the robot's streams as a record file, as `serve --record` does, but without sentences:
+/// these are in the narration, as for any other log.
+pub fn record(recording: &Recording, out: impl io::Write) -> io::Result<()> {
+    let mut writer = RecordWriter::new(out).map_err(io::Error::other)?;
+    for message in recording.messages.iter().filter(|m| !matches!(m, Message::Say(_))) {
+        writer.write(message).map_err(io::Error::other)?;
+    }
+    writer.flush().map_err(io::Error::other)
+}
+
+/// Whether a CARMEN log can say all there is: one laser, half a circle flat ahead on the body's x
+/// axis, all rays at once.
+pub fn fits_carmen(recording: &Recording) -> bool {
+    recording.messages.iter().all(|message| match message {
+        Message::Setup(setup) => match setup.lasers.as_slice() {
+            [l] => l.y_m == 0.0 && l.yaw_rad == 0.0 && !l.upside_down && l.ignored_rad.is_empty(),
+            _ => false,
+        },
+        Message::Scan(scan) => {
+            let last_rad = scan.angle_min_rad + scan.angle_increment_rad * (scan.ranges_m.len() as f64 - 1.0);
+            let half_circle = (scan.angle_min_rad + FRAC_PI_2).abs().max((last_rad - FRAC_PI_2).abs());
+            scan.time_increment_s == 0.0 && half_circle < 1e-6
+        }
+        Message::Odom(_) | Message::Say(_) | Message::End(_) => true,
+    })
 }
 
 /// The robot's streams as a CARMEN log (ODOM and FLASER lines). The format knows one laser, flat
@@ -100,7 +144,8 @@ pub fn truth(recording: &Recording) -> (Value, Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::Scenario;
+    use crate::sim::{LaserModel, Scenario};
+    use toponym_proto::record::RecordReader;
 
     fn recording() -> Recording {
         let mut scenario = Scenario::demo(1);
@@ -143,5 +188,29 @@ mod tests {
             narration(&recording).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
         assert!(!lines.is_empty());
         assert!(lines.iter().all(|l| l["t"].is_f64() && l["text"].is_string()));
+    }
+
+    #[test]
+    fn a_laser_that_carmen_logs_cannot_tell_of_gets_none() {
+        let folder = std::env::temp_dir().join(format!("toponym-sim-write-{}", std::process::id()));
+        assert_eq!(write_folder(&recording(), &folder).unwrap(), "sim.clf");
+        assert!(folder.join("sim.clf").exists() && folder.join("sim.rec").exists());
+        let mut scenario = Scenario::demo(1);
+        scenario.tour.truncate(2);
+        scenario.lasers = vec![LaserModel::rplidar()];
+        assert_eq!(write_folder(&scenario.run().unwrap(), &folder).unwrap(), "sim.rec");
+        assert!(!folder.join("sim.clf").exists(), "the one of the last run would mislead");
+        std::fs::remove_dir_all(&folder).unwrap();
+    }
+
+    #[test]
+    fn the_record_has_all_messages_but_the_sentences() {
+        let recording = recording();
+        let mut bytes = Vec::new();
+        record(&recording, &mut bytes).unwrap();
+        let read = RecordReader::new(bytes.as_slice()).unwrap().map(|m| m.unwrap().1);
+        let want = recording.messages.into_iter().filter(|m| !matches!(m, Message::Say(_)));
+        // NaN is no information, and no number equals it.
+        assert!(read.map(|m| format!("{m:?}")).eq(want.map(|m| format!("{m:?}"))));
     }
 }
