@@ -9,9 +9,9 @@ use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
 
 /// Standard deviation of a range along the normal, walls' roughness included.
-const SIGMA_M: f64 = 0.03;
+pub const SIGMA_M: f64 = 0.03;
 /// Neighbouring beams err together: so many of them count as one.
-const CORRELATED_BEAMS: f64 = 8.0;
+pub const CORRELATED_BEAMS: f64 = 8.0;
 /// Residuals beyond are mostly other things.
 const KERNEL_M: f64 = 0.06;
 /// A pair within this distance along the normal is an inlier.
@@ -43,6 +43,8 @@ pub struct Alignment {
     pub information: Matrix3<f64>,
     /// Share of the source's points that lie on the target's surfaces.
     pub inlier_share: f64,
+    /// Root mean square distance of those from the surfaces, metres.
+    pub residual_m: f64,
 }
 
 /// Registers `source` to `target`. Pairs farther apart than the gate do not count; the gate
@@ -87,6 +89,7 @@ pub fn align(
         target_from_source: x,
         information: fit.information,
         inlier_share: fit.inliers as f64 / source.len().max(1) as f64,
+        residual_m: (fit.squares / fit.inliers.max(1) as f64).sqrt(),
     })
 }
 
@@ -95,20 +98,25 @@ struct Fit {
     gradient: Vector3<f64>,
     pairs: usize,
     inliers: usize,
+    /// Sum over the inliers of their distance².
+    squares: f64,
 }
 
 /// The normal equations of every `stride`-th point.
 fn linearise(source: &[Point], stride: usize, target: &impl Surfaces, x: &Pose2, gate_m: f32) -> Fit {
     let (s, c) = x.yaw_rad.sin_cos();
     let mut sums = [0.0f64; 9];
-    let (mut pairs, mut inliers) = (0, 0);
+    let (mut pairs, mut inliers, mut squares) = (0, 0, 0.0);
     for p in source.iter().step_by(stride) {
         let moved = p.turned(x, s, c);
         let Some(q) = target.nearest(&moved, gate_m) else { continue };
         let (nx, ny) = (f64::from(q.nx), f64::from(q.ny));
         let r = nx * f64::from(moved.x - q.x) + ny * f64::from(moved.y - q.y);
         pairs += 1;
-        inliers += usize::from(r.abs() < INLIER_M);
+        if r.abs() < INLIER_M {
+            inliers += 1;
+            squares += r * r;
+        }
         // Geman–McClure weight.
         let w = (1.0 / (1.0 + (r / KERNEL_M).powi(2))).powi(2);
         // d(nᵀ X exp(δ) p)/dδ: the normal in the source's frame, and its moment about p.
@@ -125,6 +133,7 @@ fn linearise(source: &[Point], stride: usize, target: &impl Surfaces, x: &Pose2,
         gradient: Vector3::new(ar, br, mr),
         pairs,
         inliers,
+        squares,
     }
 }
 

@@ -8,8 +8,11 @@ use std::f64::consts::{PI, TAU};
 
 /// Returns beyond are too sparse to match and noisier than the map.
 const RANGE_USED_MAX_M: f64 = 30.0;
-/// Beams on either side that a normal is fitted to.
+/// Beams on either side that a normal is fitted to …
 const NORMAL_REACH: usize = 3;
+/// … and where they are dense, more, until they span so much: noise must not turn it.
+const NORMAL_SPAN_M: f64 = 0.08;
+const NORMAL_REACH_MAX: usize = 16;
 /// A normal needs neighbours this near (plus what the beam spacing explains).
 const NORMAL_GAP_M: f64 = 0.12;
 /// Thickness over length of a neighbourhood that still counts as a line.
@@ -148,11 +151,15 @@ fn normal(hits: &[Hit], k: usize, step_rad: f64) -> (f64, f64) {
     add(here);
     for ahead in [true, false] {
         let mut last = here;
-        for step in 1..=NORMAL_REACH {
+        for step in 1..=NORMAL_REACH_MAX {
             let Some(i) = (if ahead { Some(k + step) } else { k.checked_sub(step) }) else { break };
             let Some(h) = hits.get(i) else { break };
-            if h.beam.abs_diff(here.beam) > NORMAL_REACH + 1
-                || (h.x_m - last.x_m).powi(2) + (h.y_m - last.y_m).powi(2) > gap_m * gap_m
+            let near = |a: &Hit, within_m: f64| {
+                (h.x_m - a.x_m).powi(2) + (h.y_m - a.y_m).powi(2) <= within_m * within_m
+            };
+            if h.beam.abs_diff(here.beam) > step.max(NORMAL_REACH) + 1
+                || !near(last, gap_m)
+                || (step > NORMAL_REACH && !near(here, NORMAL_SPAN_M))
             {
                 break;
             }
@@ -235,6 +242,21 @@ mod tests {
         let (near, far) = s.image.at(0.0).unwrap();
         assert!((near - 2.0).abs() < 0.01 && (far - 2.0).abs() < 0.02);
         assert!(s.image.at(2.0).is_none(), "behind the laser nothing is known");
+    }
+
+    #[test]
+    fn dense_noisy_beams_still_have_normals() {
+        // A quarter of a degree apart at 1 m, noise of a centimetre is more than their spacing.
+        let mut dense = scan(vec![]);
+        dense.angle_increment_rad = 0.25f64.to_radians();
+        let noise = |k: u32| f64::from(k.wrapping_mul(2_654_435_761) >> 16) / 65_536.0 - 0.5;
+        dense.ranges_m = (0..440)
+            .map(|k| (1.0 / (-1.0 + f64::from(k) * 0.25f64.to_radians()).cos() + 0.02 * noise(k)) as f32)
+            .collect();
+        let points = sweep(&dense, &laser(), |_| Pose2::default()).points;
+        let back = laser().body_from_laser.inverse();
+        let right = points.iter().filter(|p| p.moved(&back).nx < -0.9).count();
+        assert!(right > 380, "{right} of {}", points.len());
     }
 
     #[test]

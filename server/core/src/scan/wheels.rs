@@ -163,6 +163,11 @@ impl Wheels {
         self.unseen.path_m
     }
 
+    /// How much the robot turned, to either side, since the scans last told the pose.
+    pub fn unseen_rad(&self) -> f64 {
+        self.unseen.turned_rad
+    }
+
     /// The scans told the pose: learns from the motion since a while ago.
     pub fn told(&mut self, map_from_body: &Pose2, covariance: &Matrix3<f64>) {
         self.unseen = Run::default();

@@ -85,3 +85,83 @@ fn only_a_long_break_loses_the_robot() {
         assert_eq!(frozen.iter().any(|f| f.open.chain.broken), lost, "after {gap_s} s");
     }
 }
+
+/// Odometry of a path of poses, each increment spoilt.
+fn spoilt(path: &[Pose2], spoil: impl Fn(usize, Pose2) -> Pose2) -> Vec<Pose2> {
+    let mut odom = Pose2::new(5.0, -2.0, 0.7);
+    let mut all = vec![odom];
+    for (k, w) in path.windows(2).enumerate() {
+        odom = odom.compose(&spoil(k, w[0].between(&w[1])));
+        all.push(odom);
+    }
+    all
+}
+
+#[test]
+fn at_rest_and_turning_on_the_spot_it_stays_where_it_is() {
+    let at_rest = (0..300).map(|_| 0.0);
+    let turning = (0..300).map(|k| 0.05 * f64::from(k));
+    for yaws in [at_rest.collect::<Vec<_>>(), turning.collect()] {
+        let path: Vec<Pose2> = yaws.iter().map(|&yaw| Pose2::new(-1.0, -1.0, yaw)).collect();
+        let odom = spoilt(&path, |_, d| Pose2::new(0.002 * d.yaw_rad, 0.0, 0.93 * d.yaw_rad));
+        let mut front = FrontEnd::new(1.0);
+        for (k, (pose, odom)) in path.iter().zip(&odom).enumerate() {
+            front.scan(k as i64 * 100_000_000, *odom, seen(pose, false));
+        }
+        let (end, truth) = (front.front_from_body(), path[0].between(&path[299]));
+        let off = truth.between(&end);
+        assert!(off.x_m.hypot(off.y_m) < 0.02 && off.yaw_rad.abs() < 0.01, "{off:?}");
+        assert_eq!(front.open_places().count(), 1, "no place was added");
+        assert!(front.since_place()[(2, 2)].sqrt() < 0.02, "{}", front.since_place());
+    }
+}
+
+/// Four metres in the dark with wheels that suddenly turn the robot by 3° a metre.
+fn over_the_dark(check: impl Fn(usize, &mut FrontEnd)) -> (Vec<Pose2>, Vec<FrozenPlace>) {
+    let there = (0..60).map(|k| -3.0 + 0.1 * f64::from(k));
+    let back = (0..40).map(|k| 3.0 - 0.1 * f64::from(k));
+    let path: Vec<Pose2> = there.chain(back).map(|x| Pose2::new(x, -1.0, 0.0)).collect();
+    let dark = |k: usize| (20..60).contains(&k);
+    let bend = |k: usize| if dark(k) { 0.05 } else { 0.0 };
+    let odom = spoilt(&path, |k, d| Pose2::new(d.x_m, 0.0, bend(k) * d.x_m));
+    let mut front = FrontEnd::new(1.0);
+    let mut frozen = Vec::new();
+    for (k, (pose, odom)) in path.iter().zip(&odom).enumerate() {
+        frozen.extend(front.scan(k as i64 * 100_000_000, *odom, seen(pose, dark(k))).frozen);
+        check(k, &mut front);
+    }
+    frozen.extend(front.freeze(f64::INFINITY));
+    (path, frozen)
+}
+
+#[test]
+fn a_blind_stretch_is_bridged_and_its_places_are_corrected() {
+    let (path, frozen) = over_the_dark(|_, _| {});
+    let ids: Vec<_> = frozen.iter().map(|f| f.open.id).collect();
+    assert_eq!(ids, (0..ids.len() as u64).collect::<Vec<_>>(), "in order, none left out");
+    let mut chained = Pose2::default();
+    for f in &frozen {
+        chained = chained.compose(&f.open.chain.previous_from_this);
+        let truth = path[0].between(&path[(f.open.stamp_ns / 100_000_000) as usize]);
+        let off = truth.between(&chained);
+        // In the dark itself, a smoother can only spread what it finds at the end.
+        let lit = !f.content.cloud.is_empty();
+        let most_m = if lit { 0.05 } else { 0.15 };
+        assert!(off.x_m.hypot(off.y_m) < most_m, "place {}: {off:?}", f.open.id);
+        assert!(!f.open.chain.broken);
+    }
+    assert!(frozen.iter().any(|f| f.content.cloud.is_empty()), "some places were dark");
+}
+
+#[test]
+fn a_saved_front_end_goes_on_as_if_it_had_not_been() {
+    let poses = |frozen: &[FrozenPlace]| frozen.iter().map(|f| f.open.front_from_place).collect::<Vec<_>>();
+    let config = bincode::config::standard();
+    let saved = over_the_dark(|k, front| {
+        if [10, 35, 62, 80].contains(&k) {
+            let bytes = bincode::serde::encode_to_vec(&*front, config).unwrap();
+            *front = bincode::serde::decode_from_slice(&bytes, config).unwrap().0;
+        }
+    });
+    assert_eq!(poses(&saved.1), poses(&over_the_dark(|_, _| {}).1));
+}
