@@ -90,7 +90,9 @@ fn look_up(sample: &[Point], views: &[View], views_from_sample: &Pose2, look: &L
             if (c * nx - s * ny) * x + (s * nx + c * ny) * y > -0.1 * range_m {
                 continue;
             }
-            let Some((near_m, far_m)) = view.image.at(y.atan2(x)) else { continue };
+            let Some((near_m, far_m)) = view.image.at(f64::from((y as f32).atan2(x as f32))) else {
+                continue;
+            };
             let tolerance_m = look.tolerance_m + look.tolerance_per_m * range_m;
             if range_m < near_m - tolerance_m {
                 *vote -= 1;

@@ -319,11 +319,16 @@ mod tests {
             x in -9.7f64..9.7, y in -9.7f64..9.7, yaw in -3.1f64..3.1,
         ) {
             let truth = Pose2::new(x, y, yaw);
-            let source: Vec<Point> = walls().iter().map(|p| p.moved(&truth.inverse())).collect();
-            let (best, share) = found(&walls(), &source, 4)[0];
-            let off = truth.between(&best);
-            prop_assert!(off.x_m.hypot(off.y_m) < 0.6 && off.yaw_rad.abs() < 0.1, "{best:?}");
-            prop_assert!(share > 0.8, "{share}");
+            // Halfway between the two, which both see.
+            let halfway = Pose2::new(x / 2.0, y / 2.0, 0.0);
+            let target: Vec<Point> = walls().iter().map(|p| p.moved(&halfway)).collect();
+            let source: Vec<Point> = target.iter().map(|p| p.moved(&truth.inverse())).collect();
+            let (best, share) = found(&target, &source, 4)[0];
+            for p in &source {
+                let (is, should) = (p.moved(&best), p.moved(&truth));
+                prop_assert!((is.x - should.x).hypot(is.y - should.y) < 1.0, "{best:?}");
+            }
+            prop_assert!(share > 0.7, "{share}");
         }
 
         #[test]
