@@ -2,7 +2,9 @@
 //!
 //! An iterated Kalman filter on the body's pose in a local map: odometry predicts, registration
 //! to the scans of the last metres of path corrects. Its frame drifts; only its increments are
-//! used: the chain edges between successive places and each scan's pose in its place.
+//! used: the chain edges between successive places and each scan's pose in its place. Odometry is
+//! calibrated meanwhile (`scan/wheels.rs`), and carries the robot over stretches where the laser
+//! sees nothing; the local maps on both sides are then tied as a whole (`front/bridge.rs`).
 
 use self::bridge::Dark;
 use super::align::SIGMA_M;
