@@ -11,7 +11,7 @@ use crate::graph::{Graph, Matched, Vertex};
 use crate::propose::Proposal;
 use crate::scan::correlate::Source;
 use crate::scan::front::LOCAL_PATH_M;
-use crate::scan::matching::{Mode, index, modes, refine};
+use crate::scan::matching::{Mode, index, modes, plausible, refine};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -241,6 +241,9 @@ fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
 /// The mode near a guess, if there is a good one that agrees with it.
 fn agreeing(graph: &Graph, i: Vertex, j: Vertex, guess: &Pose2) -> Option<Mode> {
     let (older, newer) = (&graph.place(i).content, &graph.place(j).content);
+    if !plausible(older, newer, guess) {
+        return None;
+    }
     let mode = refine(older, &index(older), newer, guess)?;
     let off = guess.between(&mode.i_from_j);
     (good(&mode) && off.x_m.hypot(off.y_m) < AGREE_M && off.yaw_rad.abs() < AGREE_RAD).then_some(mode)

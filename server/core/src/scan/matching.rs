@@ -76,14 +76,18 @@ fn polish(i: &Content, index: &Index, j: &Content, coarse: &Pose2) -> Option<Mod
     })
 }
 
+/// Whether a rough look at a transform leaves it open that the places fit nearby: what costs a
+/// hundredth of a registration.
+pub fn plausible(i: &Content, j: &Content, guess: &Pose2) -> bool {
+    let rough = agreement(i, j, guess, &Look::ROUGH);
+    rough.score() >= ROUGH_SCORE_MIN && rough.overlap() >= ROUGH_OVERLAP_MIN
+}
+
 /// All modes of a pair, best first, found without any prior. `source` is made of `j`.
 pub fn modes(i: &Content, j: &Content, source: &Source) -> Vec<Mode> {
     let found = search(&Raster::new(&i.cloud, &i.sample), source, HIT_SHARE_MIN, GUESSES_MAX);
-    let plausible = |guess: &Pose2| {
-        let rough = agreement(i, j, guess, &Look::ROUGH);
-        rough.score() >= ROUGH_SCORE_MIN && rough.overlap() >= ROUGH_OVERLAP_MIN
-    };
-    let guesses: Vec<Pose2> = found.into_iter().map(|(guess, _)| guess).filter(plausible).collect();
+    let guesses: Vec<Pose2> =
+        found.into_iter().map(|(guess, _)| guess).filter(|guess| plausible(i, j, guess)).collect();
     if guesses.is_empty() {
         return Vec::new();
     }
