@@ -38,6 +38,10 @@ const AGREE_M: f64 = 0.3;
 const AGREE_RAD: f64 = 0.06;
 /// Fits followed at a time.
 const FOLLOWED_MAX: usize = 8;
+/// Fits without enough support that are looked into at a time, the best first.
+const UNSUPPORTED_AT_ONCE: usize = 4;
+/// Pairs matched at a time.
+const MATCHED_AT_ONCE: usize = 2;
 /// A fit that finds no support over so many places is dropped.
 const UNSUPPORTED_MAX: u32 = 8;
 
@@ -123,7 +127,8 @@ impl Loops {
         let mut fits: Vec<Fit> = leads.par_iter().filter_map(|l| follow(graph, t, l)).collect();
         match_new(graph, t, proposals);
         for p in proposals {
-            let found = graph.memo.get(&(p.i, t)).map_or(&[][..], |m| &m.modes);
+            // What is not matched now is proposed again from the next place, a metre on.
+            let Some(Matched { modes: found }) = graph.memo.get(&(p.i, t)) else { continue };
             measured.refused.extend(refusal(p, t, found));
             fits.extend(found.iter().filter(|m| good(m)).map(|m| Fit {
                 i: p.i,
@@ -136,6 +141,11 @@ impl Loops {
             }));
         }
         let mut fits = distinct(graph, fits);
+        let mut unsupported = 0;
+        fits.retain(|f| {
+            unsupported += usize::from(!f.supported());
+            f.supported() || unsupported <= UNSUPPORTED_AT_ONCE
+        });
         fits.par_iter_mut().filter(|f| !f.supported()).for_each(|f| look_back(graph, t, f));
         for f in fits.iter().filter(|f| !f.supported()) {
             measured.refused.push(Refusal {
@@ -183,20 +193,29 @@ fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
     Some(Refusal { i: p.i, kind: p.kind, reason })
 }
 
-/// Matches the pairs that the memo does not know.
+/// Matches the pairs that the memo does not know, some at a time, the likeliest first, until one fits:
+/// the others mostly show the same revisit. Words are said once: their pairs are all matched.
 fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
-    let new: Vec<Vertex> =
-        proposals.iter().map(|p| p.i).filter(|&i| !graph.memo.contains_key(&(i, t))).collect();
+    let mut new: Vec<&Proposal> = proposals.iter().filter(|p| !graph.memo.contains_key(&(p.i, t))).collect();
     if new.is_empty() {
         return;
     }
-    let here = &graph.place(t).content;
-    let source = Source::new(&here.sample);
-    let found: Vec<(Vertex, Matched)> = new
-        .par_iter()
-        .map(|&i| (i, Matched { modes: modes(&graph.place(i).content, here, &source) }))
-        .collect();
-    graph.memo.extend(found.into_iter().map(|(i, m)| ((i, t), m)));
+    let said = |p: &Proposal| p.kind == EdgeKind::Semantic;
+    new.sort_by(|a, b| said(b).cmp(&said(a)).then(b.probability.total_cmp(&a.probability)));
+    let source = Source::new(&graph.place(t).content.sample);
+    let mut fitted = false;
+    for some in new.chunks(MATCHED_AT_ONCE) {
+        if fitted && !some.iter().any(|p| said(p)) {
+            break;
+        }
+        let here = &graph.place(t).content;
+        let found: Vec<(Vertex, Matched)> = some
+            .par_iter()
+            .map(|p| (p.i, Matched { modes: modes(&graph.place(p.i).content, here, &source) }))
+            .collect();
+        fitted |= found.iter().any(|(_, m)| m.modes.iter().any(good));
+        graph.memo.extend(found.into_iter().map(|(i, m)| ((i, t), m)));
+    }
 }
 
 /// Where a place `b`, `guess` in the frame of `i`, lies on the old path around `i`: the nearest

@@ -11,7 +11,7 @@ const RANGE_USED_MAX_M: f64 = 30.0;
 /// Beams on either side that a normal is fitted to …
 const NORMAL_REACH: usize = 3;
 /// … and where they are dense, more, until they span so much: noise must not turn it.
-const NORMAL_SPAN_M: f64 = 0.08;
+const NORMAL_SPAN_M: f64 = 0.05;
 const NORMAL_REACH_MAX: usize = 16;
 /// A normal needs neighbours this near (plus what the beam spacing explains).
 const NORMAL_GAP_M: f64 = 0.12;
