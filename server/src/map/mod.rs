@@ -98,6 +98,7 @@ fn play(mut log: Box<dyn Records>, mapper: Mapper, args: &MapArgs) -> Result<Fin
         threads: rayon::current_num_threads(),
         scan: spread(Stage::Scan),
         place: spread(Stage::Place),
+        place_growth: played.stopwatch.growth(Stage::Place),
         utterance: spread(Stage::Utterance),
         answer: spread(Stage::Answer),
         peak_mb: timing::peak_mb(),

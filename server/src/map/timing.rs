@@ -16,6 +16,9 @@ pub enum Stage {
     Answer,
 }
 
+/// Fewer durations say nothing of their tail.
+const TENTH_MIN: usize = 20;
+
 /// Durations by stage.
 #[derive(Clone, Debug, Default)]
 pub struct Stopwatch {
@@ -30,14 +33,27 @@ impl Stopwatch {
 
     /// Percentiles of a stage.
     pub fn spread(&self, stage: Stage) -> Spread {
-        let mut sorted = self.taken_ms[stage as usize].clone();
-        sorted.sort_by(f64::total_cmp);
-        let at = |share: f64| {
-            let rank = (share * sorted.len() as f64).ceil() as usize;
-            sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
-        };
-        Spread { count: sorted.len(), p50_ms: at(0.5), p99_ms: at(0.99), max_ms: at(1.0) }
+        let taken_ms = &self.taken_ms[stage as usize];
+        let at = |share| percentile(taken_ms, share);
+        Spread { count: taken_ms.len(), p50_ms: at(0.5), p99_ms: at(0.99), max_ms: at(1.0) }
     }
+
+    /// p99 of a stage's last tenth over that of its third tenth: what a growing map costs. None of a
+    /// short run.
+    pub fn growth(&self, stage: Stage) -> Option<f64> {
+        let taken_ms = &self.taken_ms[stage as usize];
+        let tenth = taken_ms.len() / 10;
+        let p99_ms = |from: usize| percentile(&taken_ms[from..from + tenth], 0.99);
+        (tenth >= TENTH_MIN).then(|| p99_ms(taken_ms.len() - tenth) / p99_ms(2 * tenth))
+    }
+}
+
+/// The nearest rank's; 0 of nothing.
+fn percentile(values: &[f64], share: f64) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = (share * sorted.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(0.0)
 }
 
 /// Percentiles (nearest rank) of a stage's durations.
@@ -70,6 +86,8 @@ pub struct Timing {
     pub scan: Spread,
     /// Scans that began a place or had edges judged.
     pub place: Spread,
+    /// p99 of the last tenth of `place` over that of the third tenth; none of a short run.
+    pub place_growth: Option<f64>,
     /// Sentences.
     pub utterance: Spread,
     /// Questions.
@@ -111,6 +129,16 @@ mod tests {
         assert_eq!(spread, Spread { count: 200, p50_ms: 100.0, p99_ms: 198.0, max_ms: 200.0 });
         assert_eq!(watch.spread(Stage::Answer).count, 1);
         assert_eq!(watch.spread(Stage::Place), Spread { count: 0, p50_ms: 0.0, p99_ms: 0.0, max_ms: 0.0 });
+    }
+
+    #[test]
+    fn growth_compares_the_last_tenth_with_the_third() {
+        let mut watch = Stopwatch::default();
+        for k in 0..400 {
+            watch.add(Stage::Place, Duration::from_millis(if k < 360 { 10 } else { 15 }));
+        }
+        assert!(watch.growth(Stage::Place).is_some_and(|g| (g - 1.5).abs() < 1e-9));
+        assert_eq!(watch.growth(Stage::Scan), None);
     }
 
     #[cfg(target_os = "linux")]
