@@ -9,7 +9,8 @@
 //! least, a normal's component is shrunk by what noise may have made it (Breiman's non-negative
 //! garrote): `n·u ← n·u (1 − τ²/(n·u)²)₊`. What faces along the corridor, a door's jamb or the end wall,
 //! still counts; the rest leaves the direction to the prior, as solution remapping does (Zhang, Kaess
-//! and Singh 2016), and the information shows it.
+//! and Singh 2016), and the information shows it. What is left may be no part of the building: there
+//! a prior may be given more weight than elsewhere.
 
 use super::cloud::{Point, Surfaces};
 use crate::geometry::Pose2;
@@ -47,6 +48,18 @@ pub struct Prior {
     pub target_from_source: Pose2,
     /// Its information, right perturbation.
     pub information: Matrix3<f64>,
+    /// Times that it counts, at most, in a direction of which the pairs say little.
+    pub where_weak: f64,
+}
+
+impl Prior {
+    /// Its information where the pairs are weak in a direction.
+    fn information(&self, weak: Option<Weak>) -> Matrix3<f64> {
+        let Some(weak) = weak else { return self.information };
+        let u = Vector3::new(weak.x, weak.y, 0.0);
+        let more = (self.where_weak - 1.0) * weak.share;
+        self.information + u * (u.transpose() * self.information * u * more) * u.transpose()
+    }
 }
 
 /// Where a cloud fits.
@@ -86,8 +99,9 @@ pub fn align(
         let (mut h, mut g) = (fit.information * stride as f64, fit.gradient * stride as f64);
         if let Some(p) = prior {
             let e = p.target_from_source.between(&x).log();
-            h += p.information;
-            g += p.information * e;
+            let information = p.information(weak);
+            h += information;
+            g += information * e;
         }
         // Enough damping to stay put along a bare corridor.
         let damping = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0)) * 1e-3;
@@ -116,7 +130,9 @@ struct Weak {
     /// Unit.
     x: f64,
     y: f64,
-    /// Variance of the component along it that noise may give a normal.
+    /// How weak it is, 0 … 1.
+    share: f64,
+    /// Square of the component along it that noise may give a normal.
     noise2: f64,
 }
 
@@ -128,8 +144,8 @@ impl Weak {
         let share = (mean - half) / (mean + half);
         // The best known direction is at half the angle of (xx − yy, 2 xy), the least is across.
         let (s, c) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
-        let noise2 = NORMAL_NOISE.powi(2) * (1.0 - share / WEAK_SHARE);
-        (share < WEAK_SHARE).then_some(Self { x: -s, y: c, noise2 })
+        let weak = 1.0 - share / WEAK_SHARE;
+        (share < WEAK_SHARE).then_some(Self { x: -s, y: c, share: weak, noise2: NORMAL_NOISE.powi(2) * weak })
     }
 
     /// A unit normal less what noise may have given it along the direction; unit again.
@@ -234,6 +250,7 @@ mod tests {
         let prior = Prior {
             target_from_source: Pose2::new(0.7, 0.05, 0.02),
             information: Matrix3::from_diagonal(&Vector3::new(25.0, 25.0, 100.0)),
+            where_weak: 1.0,
         };
         let index = Index::new(&corridor, 0.6);
         let found = align(&source, &index, &prior.target_from_source, Some(&prior), 0.6).unwrap();
@@ -253,6 +270,7 @@ mod tests {
         let prior = Prior {
             target_from_source: Pose2::new(0.4, 0.0, 0.0),
             information: Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, 1.0)),
+            where_weak: 1.0,
         };
         (walls.enumerate().map(tilted).collect(), prior)
     }
@@ -278,6 +296,10 @@ mod tests {
         let guess = prior.target_from_source;
         let found = align(&near(&corridor), &Index::new(&corridor, 0.6), &guess, Some(&prior), 0.6).unwrap();
         assert!(found.target_from_source.x_m.abs() < 0.02, "{found:?}");
+        // Unless the prior is to be trusted more than so few.
+        let firm = Prior { where_weak: 1e6, ..prior };
+        let found = align(&near(&corridor), &Index::new(&corridor, 0.6), &guess, Some(&firm), 0.6).unwrap();
+        assert!((found.target_from_source.x_m - 0.4).abs() < 0.02, "{found:?}");
     }
 
     #[test]

@@ -17,6 +17,9 @@ const SHARE_MIN: f64 = 0.25;
 /// Wheels err with a bias (a scale, a bent axle), and fused at each scan a bias adds up: odometry
 /// decides only where the scans say next to nothing.
 const ODOMETRY_TRUST: f64 = 0.02;
+/// There it counts for more: in a bare corridor the legs of a guide who walks ahead may be all that
+/// the scans show along it, and they say that the robot stands still. From simulated corridors.
+const ODOMETRY_TRUST_ALONE: f64 = 0.4;
 /// What the local map itself may be wrong by where surfaces are [`SIGMA_M`] rough.
 const MAP_SIGMAS: Vector3<f64> = Vector3::new(0.005, 0.005, 0.002);
 /// How fast the roughness of what is seen is learned, per scan.
@@ -32,8 +35,11 @@ impl FrontEnd {
     /// Registers the scan to the local map around the prediction; what it says is fused.
     pub(super) fn correct(&mut self, sweep: &Sweep) {
         let Some(information) = self.in_map.try_inverse() else { return };
-        let prior =
-            Prior { target_from_source: self.front_from_body, information: information * ODOMETRY_TRUST };
+        let prior = Prior {
+            target_from_source: self.front_from_body,
+            information: information * ODOMETRY_TRUST,
+            where_weak: ODOMETRY_TRUST_ALONE / ODOMETRY_TRUST,
+        };
         let points = thin(&sweep.points, VOXEL_M);
         let moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
         let Some(found) = self.register(&points, &prior) else { return };
@@ -82,7 +88,7 @@ impl FrontEnd {
         let found = (0..18)
             .filter_map(|k| {
                 let guess = here.compose(&Pose2::new(0.0, 0.0, f64::from(k) * 0.35));
-                let prior = Prior { target_from_source: guess, information: wide };
+                let prior = Prior { target_from_source: guess, information: wide, where_weak: 1.0 };
                 align(&points, local, &guess, Some(&prior), GATE_M)
             })
             .max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
