@@ -195,8 +195,8 @@ pub fn search(target: &Raster, source: &Source, score_min: f64, modes_max: usize
     for _ in 0..BUDGET {
         let Some(node) = heap.pop() else { break };
         let (heading, points) = &placed[usize::from(node.heading)];
-        let pose = pose_of(&node, *heading);
-        if near_known(&node, &pose, &found) {
+        let pose = pose_of(node, *heading);
+        if near_known(node, &pose, &found) {
             continue;
         }
         if node.leaf {
@@ -272,7 +272,7 @@ fn hits(target: &Raster, points: &[Placed], x: u8, y: u8) -> u8 {
 }
 
 /// Whether the whole block belongs to a mode already found.
-fn near_known(node: &Node, centre: &Pose2, found: &[(Pose2, f64)]) -> bool {
+fn near_known(node: Node, centre: &Pose2, found: &[(Pose2, f64)]) -> bool {
     let half_m = if node.leaf { 0.0 } else { f64::from(CELL_M) * 0.71 };
     found.iter().any(|(known, _)| {
         known.distance_m(centre) + half_m < DISTINCT_M
@@ -280,7 +280,7 @@ fn near_known(node: &Node, centre: &Pose2, found: &[(Pose2, f64)]) -> bool {
     })
 }
 
-fn pose_of(node: &Node, heading: u8) -> Pose2 {
+fn pose_of(node: Node, heading: u8) -> Pose2 {
     let middle = if node.leaf { 0.0 } else { 0.5 };
     let shift_m = |k: u8| (f64::from(k) + middle - SHIFTS as f64 / 2.0) * f64::from(CELL_M);
     Pose2::new(shift_m(node.x), shift_m(node.y), f64::from(heading) * std::f64::consts::TAU / HEADINGS as f64)
@@ -340,7 +340,7 @@ mod tests {
             let n = source.points.len() as f64;
             let brute = headings(&target, &source)
                 .into_iter()
-                .flat_map(|h| {
+                .filter_map(|h| {
                     let points = place(&source, h);
                     (0..SHIFTS as u8).flat_map(|y| (0..SHIFTS as u8).map(move |x| (x, y)))
                         .map(|(x, y)| hits(&target, &points, x, y))
