@@ -7,7 +7,6 @@
 //! sees nothing; the local maps on both sides are then tied as a whole (`front/bridge.rs`).
 
 use self::bridge::Dark;
-use self::companions::Companions;
 use super::align::SIGMA_M;
 use super::local::LocalMap;
 use super::place::Content;
@@ -114,7 +113,6 @@ pub struct FrontEnd {
     stamp_ns: StampNs,
     path_m: f64,
     wheels: Wheels,
-    companions: Companions,
     /// Distance of what is seen from the local map's surfaces, root mean square.
     rough_m: f64,
     /// Covariance of the pose in the local map.
@@ -146,7 +144,6 @@ impl FrontEnd {
             stamp_ns: 0,
             path_m: 0.0,
             wheels: Wheels::default(),
-            companions: Companions::default(),
             rough_m: SIGMA_M,
             in_map: Matrix3::zeros(),
             since_place: Matrix3::zeros(),
@@ -162,7 +159,6 @@ impl FrontEnd {
     /// Odometry restarted or jumped: the next increment means nothing.
     pub fn break_odometry(&mut self) {
         self.broken = self.odom_from_body.is_some();
-        self.companions.forget();
     }
 
     /// Places not yet frozen, oldest first.
@@ -183,7 +179,6 @@ impl FrontEnd {
     /// Takes a scan with the odometry at its stamp.
     pub fn scan(&mut self, stamp_ns: StampNs, odom_from_body: Pose2, sweep: Sweep) -> Placed {
         let mut frozen = Vec::new();
-        let sweep = self.companions.dismiss(&odom_from_body, sweep);
         let blind = sweep.points.len() < SEEN_MIN;
         if std::mem::take(&mut self.broken) {
             let carried = stamp_ns.saturating_sub(self.stamp_ns).saturating_abs() > CARRIED_NS;
@@ -351,7 +346,6 @@ impl FrontEnd {
 }
 
 mod bridge;
-mod companions;
 mod registration;
 #[cfg(test)]
 mod tests;
