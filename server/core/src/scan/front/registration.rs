@@ -18,7 +18,8 @@ const SHARE_MIN: f64 = 0.25;
 /// decides only where the scans say next to nothing.
 const ODOMETRY_TRUST: f64 = 0.02;
 /// There it counts for more: in a bare corridor the legs of a guide who walks ahead may be all that
-/// the scans show along it, and they say that the robot stands still. From simulated corridors.
+/// the scans show along it, and they say that the robot stands still. More mends simulated corridors
+/// and harms real tours with a range of 8 m.
 const ODOMETRY_TRUST_ALONE: f64 = 0.2;
 /// What the local map itself may be wrong by where surfaces are [`SIGMA_M`] rough.
 const MAP_SIGMAS: Vector3<f64> = Vector3::new(0.005, 0.005, 0.002);
