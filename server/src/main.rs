@@ -5,8 +5,7 @@ use std::process::ExitCode;
 use toponym_server::serve::args::{self, LogFormat, ServeArgs};
 use toponym_server::{demo, map};
 
-/// Particles make and drop many arrays of a few kilobytes: this allocator takes a third off the smoother's
-/// time.
+/// Particles make and drop many arrays of a few kilobytes, which the system's allocator scatters.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

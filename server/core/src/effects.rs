@@ -2,6 +2,7 @@
 
 use crate::event::StampNs;
 use crate::geometry::Pose2;
+use crate::propose::Proposal;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -64,17 +65,6 @@ pub struct Heard {
     pub grounded: Vec<(PlaceId, f64)>,
     /// In words, for the guide.
     pub words: String,
-}
-
-/// An older place that was looked at.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Proposed {
-    /// The older place.
-    pub i: PlaceId,
-    /// By which distribution.
-    pub kind: EdgeKind,
-    /// Its probability there, of the particle that gives most.
-    pub probability: f64,
 }
 
 /// One consequence of an event.
@@ -152,8 +142,9 @@ pub enum Effect {
         place: PlaceId,
         /// Stamp of its first scan.
         stamp_ns: StampNs,
-        /// The older places that were looked at.
-        proposed: Vec<Proposed>,
+        /// The older places that were proposed, each with the largest probability that a particle gives
+        /// it; of many the likeliest are matched, and the others wait.
+        proposed: Vec<Proposal>,
         /// Copies and weight of each distinct graph, best first; weights sum to one.
         weights: Vec<(u32, f64)>,
         /// Effective sample size, before any resampling.

@@ -4,7 +4,7 @@
 //! p(L | X, G, z, u, λ) · p(X | G, z, u, λ) · p(G | z, u, λ), eq. (2).
 
 use crate::config::Config;
-use crate::effects::{Effect, Effects, Proposed};
+use crate::effects::{Effect, Effects};
 use crate::geometry::Pose2;
 use crate::graph::{Graph, Vertex};
 use crate::inject::inject;
@@ -76,16 +76,15 @@ impl Filter {
             effects.push(Effect::Resampled { effective_sample_size: size });
         }
         self.forget();
-        effects.push(self.weighed(t, &proposals, size));
+        effects.push(self.weighed(t, proposals, size));
         effects
     }
 
-    fn weighed(&self, t: Vertex, proposals: &[Proposal], effective_sample_size: f64) -> Effect {
-        let told = |p: &Proposal| Proposed { i: p.i.into(), kind: p.kind, probability: p.probability };
+    fn weighed(&self, t: Vertex, proposed: Vec<Proposal>, effective_sample_size: f64) -> Effect {
         Effect::Weighed {
             place: t.into(),
             stamp_ns: self.graph.place(t).stamp_ns,
-            proposed: proposals.iter().map(told).collect(),
+            proposed,
             weights: self.particles.iter().map(|p| (p.count, p.weight())).collect(),
             effective_sample_size,
         }

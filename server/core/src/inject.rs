@@ -11,7 +11,7 @@ use crate::loops::Fit;
 use crate::random::{Purpose, generator};
 use crate::scan::correlate::WINDOW_M;
 use rand::RngExt;
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 
 /// Replaces the transform of each fit with probability `config.inject_loops` by one that is uniform over
 /// the search's window.
@@ -23,7 +23,7 @@ pub fn inject(config: &Config, t: Vertex, fits: &mut [Fit]) {
         let mut draw = generator(config.seed, t.into(), fit.i.into(), Purpose::Inject);
         if draw.random::<f64>() < config.inject_loops {
             let mut within = |half: f64| half * (2.0 * draw.random::<f64>() - 1.0);
-            fit.mode.i_from_j = Pose2::new(within(WINDOW_M), within(WINDOW_M), within(PI).rem_euclid(TAU));
+            fit.mode.i_from_j = Pose2::new(within(WINDOW_M), within(WINDOW_M), within(PI));
         }
     }
 }

@@ -45,7 +45,7 @@ pub struct MapArgs {
     /// How --trajectory is written
     #[arg(long, value_name = "FORMAT", value_enum, default_value_t)]
     pub trajectory_format: Format,
-    /// Write a line of JSON per place: what was looked at, edges taken and refused and why, weights
+    /// Write a line of JSON per place: what was proposed, edges taken and refused and why, weights
     #[arg(long, value_name = "FILE.jsonl")]
     pub history: Option<PathBuf>,
     /// Write places, graphs, answers, sentences and timing

@@ -6,7 +6,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use toponym_core::Effect;
-use toponym_core::effects::{EdgeKind, PlaceId, Proposed};
+use toponym_core::effects::{EdgeKind, PlaceId};
+use toponym_core::propose::Proposal;
 use toponym_proto::stream::Stamp;
 
 /// Writes the history file.
@@ -25,7 +26,7 @@ pub struct History {
 struct Line<'a> {
     place: PlaceId,
     stamp_s: f64,
-    proposed: &'a [Proposed],
+    proposed: &'a [Proposal],
     edges: Vec<Edge>,
     effective_sample_size: f64,
     resampled: bool,

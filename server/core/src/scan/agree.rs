@@ -8,7 +8,8 @@ use super::cloud::Point;
 use super::place::{Content, View};
 use crate::geometry::Pose2;
 
-/// Agreeing points that a conflicting one outweighs.
+/// Agreeing points that a conflicting one outweighs; from the same pairs as the thresholds of
+/// `scan/matching.rs`.
 const CONFLICT_WEIGHT: f64 = 5.0;
 
 /// How closely two places are compared.

@@ -238,8 +238,9 @@ fn place(source: &Source, heading: usize) -> Vec<Placed> {
         .points
         .iter()
         .map(|p| Placed {
-            x: (cell(c * p.x - s * p.y) - half) as u16,
-            y: (cell(s * p.x + c * p.y) - half) as u16,
+            // Turning may round a point at the reach's edge to just beyond it.
+            x: cell(c * p.x - s * p.y).saturating_sub(half) as u16,
+            y: cell(s * p.x + c * p.y).saturating_sub(half) as u16,
             octant: octant(p.turn + turn),
         })
         .collect()

@@ -221,23 +221,18 @@ impl FrontEnd {
     /// Freezes every place that began at or before a point of the path.
     pub fn freeze(&mut self, path_m: f64) -> Vec<FrozenPlace> {
         let mut frozen = Vec::new();
+        let all = path_m == f64::INFINITY;
         // The place held must stay, to hold the next scans.
-        while self.open.front().is_some_and(|p| p.path_m <= path_m)
-            && (self.open.len() > 1 || path_m == f64::INFINITY)
-            && (path_m == f64::INFINITY || self.open.front().is_none_or(|p| !self.is_held_back(p.id)))
-        {
+        let may = |front: &Self, p: &OpenPlace| {
+            p.path_m <= path_m && front.open.len() > 1 && !front.is_held_back(p.id)
+        };
+        while self.open.front().is_some_and(|p| all || may(self, p)) {
             let Some(open) = self.open.pop_front() else { break };
             let near = |k: &&Key| (k.path_m - open.path_m).abs() <= CONTENT_REACH_M;
-            let sweeps: Vec<(Pose2, &Sweep)> = self
-                .keys
-                .iter()
-                .filter(near)
-                .map(|k| (open.front_from_place.between(&k.front_from_body), &k.sweep))
-                .collect();
-            let content = Content::new(&sweeps);
+            let content = content(self.keys.iter().filter(near), &open.front_from_place);
             frozen.push(FrozenPlace { open, content });
         }
-        if path_m == f64::INFINITY {
+        if all {
             self.dark = None;
         }
         frozen
@@ -343,6 +338,12 @@ impl FrontEnd {
             local
         })
     }
+}
+
+/// What some scans show, in a frame.
+fn content<'a>(keys: impl Iterator<Item = &'a Key>, front_from_frame: &Pose2) -> Content {
+    let sweeps: Vec<_> = keys.map(|k| (front_from_frame.between(&k.front_from_body), &k.sweep)).collect();
+    Content::new(&sweeps)
 }
 
 mod bridge;

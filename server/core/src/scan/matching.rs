@@ -11,6 +11,9 @@ use serde::{Deserialize, Serialize};
 
 /// Modes kept of a pair.
 const MODES_MAX: usize = 4;
+// Shares and scores below are from true and unrelated pairs of six logs together: Intel, CSAIL, Stata with
+// two ranges, two simulated offices.
+
 /// Share of the source's points that must hit for a transform to be looked at.
 const HIT_SHARE_MIN: f64 = 0.22;
 /// Transforms looked at.
@@ -76,8 +79,8 @@ fn polish(i: &Content, index: &Index, j: &Content, coarse: &Pose2) -> Option<Mod
     })
 }
 
-/// Whether a rough look at a transform leaves it open that the places fit nearby: what costs a
-/// hundredth of a registration.
+/// Whether a rough look at a transform, far cheaper than registration, leaves it open that the places
+/// fit nearby.
 pub fn plausible(i: &Content, j: &Content, guess: &Pose2) -> bool {
     let rough = agreement(i, j, guess, &Look::ROUGH);
     rough.score() >= ROUGH_SCORE_MIN && rough.overlap() >= ROUGH_OVERLAP_MIN

@@ -10,7 +10,8 @@ use std::f64::consts::{PI, TAU};
 const RANGE_USED_MAX_M: f64 = 30.0;
 /// Beams on either side that a normal is fitted to …
 const NORMAL_REACH: usize = 3;
-/// … and where they are dense, more, until they span so much: noise must not turn it.
+/// … and where they are dense, more, until they span so much to either side: noise must not turn it.
+/// From tours of the Stata Center, where 8 cm round off corners, and simulated offices.
 const NORMAL_SPAN_M: f64 = 0.05;
 const NORMAL_REACH_MAX: usize = 16;
 /// A normal needs neighbours this near (plus what the beam spacing explains).

@@ -10,7 +10,7 @@
 //! δ_i = P_i F_iᵀ (P_n + R)⁻¹ e,    e = log(predicted⁻¹ · found)
 //! ```
 
-use super::{Chain, FrontEnd, Key, OpenPlace};
+use super::{Chain, FrontEnd, OpenPlace, content};
 use crate::effects::PlaceId;
 use crate::geometry::Pose2;
 use crate::scan::cloud::{Index, Surfaces};
@@ -146,11 +146,6 @@ impl FrontEnd {
         self.local = None;
         self.wheels.lift();
     }
-}
-
-fn content<'a>(keys: impl Iterator<Item = &'a Key>, front_from_frame: &Pose2) -> Content {
-    let sweeps: Vec<_> = keys.map(|k| (front_from_frame.between(&k.front_from_body), &k.sweep)).collect();
-    Content::new(&sweeps)
 }
 
 /// Covariances of places, right perturbation, given the place before the first.

@@ -214,7 +214,7 @@ fn along_a_bare_corridor_odometry_decides_and_the_covariance_shows_it() {
         }
         odom_m = front.odom_from_body.unwrap().x_m;
         let here = front.front_from_body();
-        assert!((here.x_m - odom_m).abs() < 0.015 * odom_m, "{swept} {wheels}: {odom_m}, made {here:?}");
+        assert!((here.x_m - odom_m).abs() < 0.006 * odom_m, "{swept} {wheels}: {odom_m}, made {here:?}");
         assert!(here.y_m.abs() < 0.05 && here.yaw_rad.abs() < 0.02, "{here:?}");
         frozen.extend(front.freeze(f64::INFINITY));
         for f in &frozen[1..] {
