@@ -165,6 +165,8 @@ impl Scene {
                 let by_path = 0.5 * self.path_trust;
                 (1.0 - by_path) * self.straight(relation, place) + by_path * self.travelled(relation, place)
             }
+            // Not modelled: somewhere about.
+            _ => gauss2(d2, AWAY_BOUND_M),
         }
     }
 

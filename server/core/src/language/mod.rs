@@ -16,6 +16,7 @@ mod normalise;
 mod noun_phrase;
 mod numbers;
 mod parse;
+mod relation;
 mod word_lists;
 mod words;
 
@@ -23,6 +24,7 @@ pub use ground::{GroundPlace, Grounding, ground};
 pub use names::Name;
 pub use normalise::MAX_TEXT_BYTES;
 pub use parse::{parse, parse_query};
+pub use relation::Relation;
 pub use words::{NOT_UNDERSTOOD, words};
 
 use serde::{Deserialize, Serialize};
@@ -73,20 +75,6 @@ pub enum Sameness {
     Other,
     /// Nothing said.
     Open,
-}
-
-/// The paper's four relations.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Relation {
-    /// Beyond the landmark, which one passes through.
-    Through,
-    /// Along the landmark or at its far end.
-    Down,
-    /// Far from the landmark.
-    AwayFrom,
-    /// Close to the landmark.
-    Near,
 }
 
 /// What a figure is located by.

@@ -8,7 +8,7 @@
 //! NAME     = the canonical name with "_" for spaces
 //! ```
 
-use super::{Act, Landmark, Name, Relation, Sameness};
+use super::{Act, Landmark, Name, Sameness};
 
 /// What the guide is told when nothing was understood.
 pub const NOT_UNDERSTOOD: &str = "I did not understand; nothing was changed. Try: this is the kitchen.";
@@ -33,12 +33,7 @@ fn act_notation(act: &Act) -> String {
             }
         }
         Act::Locate { figure, relation, landmark } => {
-            let relation = match relation {
-                Relation::Through => "through",
-                Relation::Down => "down",
-                Relation::AwayFrom => "away_from",
-                Relation::Near => "near",
-            };
+            let relation = relation.notation();
             let landmark = match landmark {
                 Landmark::Name(name) => written(name),
                 Landmark::Here => "here".to_owned(),
@@ -77,12 +72,7 @@ fn clause(act: &Act) -> String {
         Act::Label { name, again: Sameness::Same } => format!("you are back in {}", name.with_article()),
         Act::Label { name, again: Sameness::Other } => format!("you are in another {name}"),
         Act::Locate { figure, relation, landmark } => {
-            let relation = match relation {
-                Relation::Through => "through",
-                Relation::Down => "down",
-                Relation::AwayFrom => "away from",
-                Relation::Near => "near",
-            };
+            let relation = relation.words();
             let verb = if is_plural_only(figure) { "are" } else { "is" };
             let landmark = match landmark {
                 Landmark::Name(name) => name.with_article(),
