@@ -7,6 +7,7 @@
 //! Deliberately absent here: negation, correction, hedges, routes, generic statements, other
 //! relations. A sentence that holds any of them is not understood rather than half understood.
 
+pub mod act;
 mod ground;
 mod label;
 mod lexicon;
