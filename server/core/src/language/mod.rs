@@ -18,6 +18,7 @@ mod noun_phrase;
 mod numbers;
 mod parse;
 mod relation;
+mod typed;
 mod word_lists;
 mod words;
 
@@ -26,7 +27,8 @@ pub use names::Name;
 pub use normalise::MAX_TEXT_BYTES;
 pub use parse::{parse, parse_query};
 pub use relation::Relation;
-pub use words::{NOT_UNDERSTOOD, words};
+pub use typed::{understand, words};
+pub use words::NOT_UNDERSTOOD;
 
 use serde::{Deserialize, Serialize};
 
