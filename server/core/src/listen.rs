@@ -7,7 +7,8 @@ use crate::filter::Filter;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::{DIRECT, Evidence, LabelId, Labels, Source};
-use crate::language::{self, Act, GroundPlace, Landmark, Name, Parse, Relation, Sameness};
+use crate::language::act::{Content, Head, Locate, Phrase};
+use crate::language::{self, Act, GroundPlace, Name, Parse, Relation, Sameness};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -105,8 +106,9 @@ impl Filter {
         }
         let (text, parse) = understand(u);
         let known = |name: &Name| self.ledger.label(name.as_str()).is_some();
-        let words = language::words(&parse.acts, known);
-        if parse.acts.is_empty() {
+        let words = language::words(parse.acts(), known);
+        if !parse.acts().iter().any(|act| plain(act).is_some() || matches!(act.content, Content::Ask { .. }))
+        {
             return heard(u, HeardStatus::NotUnderstood, &parse, words);
         }
         if self.ledger.ids.contains(&u.id) {
@@ -116,14 +118,14 @@ impl Filter {
             let words = format!("{words} But I have seen nothing yet: say it again when I have moved.");
             return heard(u, HeardStatus::Refused, &parse, words);
         };
-        if let Some(name) = unknown_landmark(&parse.acts, known) {
+        if let Some(name) = unknown_landmark(parse.acts(), known) {
             let words = format!("{words} Name it where it is (\"this is the {name}\"), then say it again.");
             return heard(u, HeardStatus::Refused, &parse, words);
         }
         let entry = Entry { id: u.id.clone(), stamp_ns: u.began_ns, text, parse: parse.clone(), held };
         let number = Arc::make_mut(&mut self.ledger).enter(entry);
-        for act in &parse.acts {
-            self.label(act, number, held, here);
+        for told in parse.acts().iter().filter_map(plain) {
+            self.label(&told, number, held, here);
         }
         let mut heard = heard(u, HeardStatus::Understood, &parse, words);
         heard.grounded = self.told(number);
@@ -131,20 +133,17 @@ impl Filter {
     }
 
     /// Updates the labels of every particle by one act, eqs. (12–16).
-    fn label(&mut self, act: &Act, utterance: u32, held: Vertex, here: &Here) {
-        match act {
-            Act::Label { name, again } => {
+    fn label(&mut self, told: &Told, utterance: u32, held: Vertex, here: &Here) {
+        match told {
+            Told::Label { name, again } => {
                 let label = Arc::make_mut(&mut self.ledger).enter_name(name);
                 let source = if *again == Sameness::Other { Source::DirectOther } else { Source::Direct };
                 for p in &mut self.particles {
                     p.labels.add(Evidence { utterance, label, place: held, weight: DIRECT, source });
                 }
             }
-            Act::Locate { figure, relation, landmark } => {
-                let landmark = match landmark {
-                    Landmark::Here => None,
-                    Landmark::Name(name) => self.ledger.label(name.as_str()),
-                };
+            Told::Locate { figure, relation, landmark } => {
+                let landmark = landmark.as_ref().and_then(|name| self.ledger.label(name.as_str()));
                 let figure = Arc::make_mut(&mut self.ledger).enter_name(figure);
                 for p in &mut self.particles {
                     let poses = (here.poses)(p);
@@ -155,7 +154,6 @@ impl Filter {
                     }
                 }
             }
-            Act::AskWhere { .. } => {}
         }
     }
 
@@ -175,20 +173,45 @@ impl Filter {
     }
 }
 
-/// The text as heard, or the likeliest other hearing that makes sense.
-fn understand(u: &Utterance) -> (String, Parse) {
-    let mut others: Vec<&(String, f64)> = u.alternatives.iter().collect();
-    others.sort_by(|a, b| b.1.total_cmp(&a.1));
-    std::iter::once(&u.text)
-        .chain(others.into_iter().map(|(text, _)| text))
-        .map(|text| (text.clone(), language::parse(text)))
-        .find(|(_, parse)| !parse.acts.is_empty())
-        .unwrap_or_else(|| (u.text.clone(), language::parse(&u.text)))
+/// What the map takes from an act: other acts are set aside.
+enum Told {
+    /// The place held is called so.
+    Label { name: Name, again: Sameness },
+    /// The figure lies so to a named landmark; to the place held if none.
+    Locate { figure: Name, relation: Relation, landmark: Option<Name> },
 }
 
-fn unknown_landmark(acts: &[Act], known: impl Fn(&Name) -> bool) -> Option<&str> {
-    acts.iter().find_map(|act| match act {
-        Act::Locate { landmark: Landmark::Name(name), .. } if !known(name) => Some(name.as_str()),
+fn plain(act: &Act) -> Option<Told> {
+    match &act.content {
+        Content::Label { at, what, sameness } if at.head == Head::Here => {
+            Some(Told::Label { name: what.label()?, again: *sameness })
+        }
+        Content::Locate(Locate { figure, relation, landmarks, .. }) => {
+            let [landmark] = landmarks.as_slice() else { return None };
+            let landmark = if landmark.head == Head::Here { None } else { Some(bare(landmark)?) };
+            Some(Told::Locate { figure: bare(figure)?, relation: *relation, landmark })
+        }
+        _ => None,
+    }
+}
+
+/// The name of a phrase that says nothing more.
+fn bare(phrase: &Phrase) -> Option<Name> {
+    let counted = phrase.features.ordinal.is_some() || phrase.features.count.is_some();
+    if counted || !phrase.within.is_empty() { None } else { phrase.label() }
+}
+
+/// The likeliest reading over all hearings, and the text that it reads.
+fn understand(u: &Utterance) -> (String, Parse) {
+    let parse = language::parse_hearings(&u.text, &u.alternatives);
+    let heard = parse.best().map_or(0, |best| best.hearing);
+    let text = heard.checked_sub(1).and_then(|k| u.alternatives.get(k)).map_or(&u.text, |(text, _)| text);
+    (text.clone(), parse)
+}
+
+fn unknown_landmark(acts: &[Act], known: impl Fn(&Name) -> bool) -> Option<String> {
+    acts.iter().filter_map(plain).find_map(|told| match told {
+        Told::Locate { landmark: Some(name), .. } if !known(&name) => Some(name.as_str().to_owned()),
         _ => None,
     })
 }
@@ -235,7 +258,7 @@ fn heard(u: &Utterance, status: HeardStatus, parse: &Parse, words: String) -> He
         stamp_ns: u.began_ns,
         text: u.text.clone(),
         status,
-        parse: parse.notation.clone(),
+        parse: parse.notation().to_owned(),
         grounded: Vec::new(),
         words,
     }
