@@ -1,7 +1,6 @@
 //! Questions. They assert nothing.
 
-use super::act::Sameness;
-use super::act::{About, Content, Features, Head, Phrase, Question};
+use super::act::{About, Content, Head, Phrase, Question, Sameness};
 use super::build::{Readings, label, one};
 use super::cursor::Cursor;
 use super::locate::locate_clause;
@@ -129,7 +128,7 @@ fn ask_why(at: &mut Cursor) -> Option<Content> {
 /// The likeliest reading of a statement.
 fn statement(at: &mut Cursor) -> Option<Content> {
     let readings = super::label::label_clause(at).or_else(|| locate_clause(at))?;
-    readings.into_iter().next().and_then(|(_, all)| all.into_iter().next())
+    readings.first().first().cloned()
 }
 
 /// "How far is the gym?"
@@ -202,6 +201,3 @@ pub(super) fn asked_name(content: &Content) -> Option<Name> {
         _ => None,
     }
 }
-
-#[allow(unused)]
-fn unused(_: Features) {}

@@ -122,11 +122,14 @@ impl Chain {
     fn tree(&self, parents: &[usize]) -> Vec<Related> {
         let mut links: Vec<Related> = self.links.iter().map(|(r, _)| r.clone()).collect();
         // A link comes after what it attaches to: from the last on, each is complete.
+        let own: Vec<usize> =
+            links.iter().map(|l| l.landmarks.last().map_or(0, |p| p.within.len())).collect();
         for i in (0..links.len()).rev() {
             if parents[i] > 0 {
+                let host = parents[i] - 1;
                 let link = links[i].restriction();
-                if let Some(landmark) = links[parents[i] - 1].landmarks.last_mut() {
-                    landmark.within.insert(0, link);
+                if let Some(landmark) = links[host].landmarks.last_mut() {
+                    landmark.within.insert(own[host], link);
                 }
             }
         }

@@ -1,23 +1,44 @@
 //! Acts from what the clauses read.
 
-use super::act::{Act, Content, Features, Frame, Head, Locate, Phrase, Sameness};
+use super::act::{Content, Features, Frame, Head, Locate, Phrase, Sameness};
 use super::attach::Weighed;
 use super::copula::Copula;
 use super::relate::Related;
 use super::relation::Relation as R;
 
-/// What a clause may say: each reading with its weight.
-pub(super) type Readings = Weighed<Vec<Content>>;
+/// What a clause may say.
+#[derive(Clone, Debug)]
+pub(super) struct Readings {
+    /// Each reading with its weight, likeliest first; never empty.
+    pub(super) all: Weighed<Vec<Content>>,
+    /// How sure the speaker is of it.
+    pub(super) certainty: f64,
+}
+
+impl Readings {
+    pub(super) fn new(mut all: Weighed<Vec<Content>>) -> Self {
+        keep_best(&mut all);
+        Self { all, certainty: 1.0 }
+    }
+
+    /// The likeliest reading.
+    pub(super) fn first(&self) -> &[Content] {
+        self.all.first().map_or(&[], |(_, said)| said)
+    }
+
+    /// The same readings with other contents.
+    pub(super) fn map(self, change: impl Fn(Content) -> Content) -> Self {
+        let all =
+            self.all.into_iter().map(|(w, said)| (w, said.into_iter().map(&change).collect())).collect();
+        Self { all, ..self }
+    }
+}
 
 /// Readings of a clause that are kept.
 const READINGS_MAX: usize = 4;
 
-pub(super) fn certain(content: Content) -> Act {
-    Act { content, certainty: 1.0 }
-}
-
 pub(super) fn one(content: Content) -> Readings {
-    vec![(1.0, vec![content])]
+    Readings::new(vec![(1.0, vec![content])])
 }
 
 pub(super) fn label(at: Head, what: Phrase, sameness: Sameness) -> Content {
@@ -41,7 +62,7 @@ pub(super) fn locate(figure: &Phrase, related: &Related) -> Content {
 
 /// Every figure at every relation, for each reading of either.
 pub(super) fn locate_all(figures: &[Weighed<Phrase>], grounds: &Weighed<Vec<Related>>) -> Readings {
-    let mut out: Readings = grounds
+    let all = grounds
         .iter()
         .flat_map(|(w, related)| {
             figures.first().into_iter().flatten().enumerate().map(move |(i, (v, first))| {
@@ -51,8 +72,7 @@ pub(super) fn locate_all(figures: &[Weighed<Phrase>], grounds: &Weighed<Vec<Rela
             })
         })
         .collect();
-    keep_best(&mut out);
-    out
+    Readings::new(all)
 }
 
 pub(super) fn keep_best<T>(readings: &mut Weighed<T>) {
@@ -60,12 +80,11 @@ pub(super) fn keep_best<T>(readings: &mut Weighed<T>) {
     readings.truncate(READINGS_MAX);
 }
 
-/// Denies each statement if the verb does.
-pub(super) fn denied(readings: Readings, copula: &Copula) -> Readings {
-    if !(copula.negated ^ copula.former) {
-        return readings;
-    }
-    readings.into_iter().map(|(w, all)| (w, all.into_iter().map(negate).collect())).collect()
+/// The statement as its verb shapes it: denied, doubted, said to correct.
+pub(super) fn shaped(readings: Readings, copula: &Copula) -> Readings {
+    let denied = copula.negated ^ copula.former;
+    let doubted = Readings { certainty: readings.certainty * copula.certainty, ..readings };
+    if denied { doubted.map(negate) } else { doubted }
 }
 
 pub(super) fn negate(content: Content) -> Content {

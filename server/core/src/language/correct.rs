@@ -4,7 +4,7 @@ use super::act::{Act, Content, Head, Locate, Phrase, Sameness};
 use super::build::{Readings, label, locate_all, negate, one};
 use super::cursor::Cursor;
 use super::label::{named, plausible};
-use super::locate::renamed;
+use super::locate::{located, renamed};
 
 /// Said before a clause: what was said before was wrong.
 const MARKS: &str = "no , no|no wait|no|nope|sorry|my bad|my mistake|my apologies|i was wrong about that|i was wrong|i was mistaken|\
@@ -52,15 +52,22 @@ fn thing_called(at: &mut Cursor) -> Option<Readings> {
     at.skip("earlier|before|just now");
     at.copula().filter(|c| !c.negated)?;
     let is = named(at)?;
-    Some(vec![(1.0, renamed(was.phrase, is.phrase))])
+    Some(Readings::new(vec![(1.0, renamed(was.phrase, is.phrase))]))
 }
 
 /// After a clause that said `last`: "…, not the kitchen", "…, sorry, the gym", "… but the gym".
 pub(super) fn mend(at: &mut Cursor, last: &Content) -> Option<Readings> {
+    // What corrects may itself be mended.
+    let last = match last {
+        Content::Correct { is, .. } => is,
+        other => other,
+    };
     at.skip(",");
+    if let Some(said) = gapped(at, last) {
+        return Some(said);
+    }
     if at.eat_any("and not|but not|not").is_some() {
-        return instead(at, last)
-            .map(|all| all.into_iter().map(|(w, c)| (w, c.into_iter().map(negate).collect())).collect());
+        return instead(at, last).map(|readings| readings.map(negate));
     }
     if let Content::Negate(denied) = last {
         at.skip("but|rather|instead|no|it is|this is|that is|,");
@@ -76,7 +83,23 @@ pub(super) fn mend(at: &mut Cursor, last: &Content) -> Option<Readings> {
         if again { None } else { instead(at, last) }
     })?;
     let corrected = |is: Content| Content::Correct { was: Some(Box::new(last.clone())), is: Box::new(is) };
-    Some(readings.into_iter().map(|(w, all)| (w, all.into_iter().map(corrected).collect())).collect())
+    Some(readings.map(corrected))
+}
+
+/// "… and the lounge on the right": another figure at another place, without a verb.
+fn gapped(at: &mut Cursor, last: &Content) -> Option<Readings> {
+    let start = *at;
+    let read = matches!(last, Content::Locate(_)).then(|| {
+        at.skip(",|and|but");
+        let figure = at.noun_phrase()?;
+        at.eat(",");
+        located(&[figure], &at.chain(false))
+    });
+    let said = read.flatten();
+    if said.is_none() {
+        *at = start;
+    }
+    said
 }
 
 /// What the words here say in the place of `said`: another name, another relation.
@@ -88,8 +111,8 @@ fn instead(at: &mut Cursor, said: &Content) -> Option<Readings> {
         }
         Content::Locate(Locate { figure, .. }) => {
             let chain = at.chain(false);
-            chain.first()?;
-            Some(locate_all(&[vec![(1.0, figure.clone())]], &chain.attach()))
+            let links = if chain.is_empty() { vec![(1.0, vec![at.other_side()?])] } else { chain.attach() };
+            Some(locate_all(&[vec![(1.0, figure.clone())]], &links))
         }
         _ => None,
     }
@@ -121,6 +144,8 @@ fn join(first: &Content, second: &Content) -> Option<Content> {
         (Content::Negate(was), is) => corrected(was, is),
         (Content::Correct { was: None, is }, Content::Negate(was)) => corrected(was, is),
         (Content::Correct { was: Some(_), is }, again) if **is == *again => Some(first.clone()),
+        // "This is the kitchen, I mean the gym": the kitchen is taken back, not said.
+        (said, Content::Correct { was: Some(was), .. }) if **was == *said => Some(second.clone()),
         // "This is the kitchen. No, this is the gym."
         (was, Content::Correct { was: None, is }) => corrected(was, is),
         (is, Content::Negate(was)) => corrected(was, is),

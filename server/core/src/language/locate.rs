@@ -3,7 +3,7 @@
 
 use super::act::{Content, Head, Owner, Phrase, Sameness};
 use super::attach::{Chain, Weighed};
-use super::build::{Readings, denied, label, locate_all, negate, one};
+use super::build::{Readings, label, locate_all, negate, one, shaped};
 use super::copula::Copula;
 use super::cursor::Cursor;
 use super::describe::attribute;
@@ -43,11 +43,7 @@ fn presented(at: &mut Cursor) -> Option<Readings> {
     // "You have a kitchen" says nothing; "there is a room" neither.
     let readings = located(&figures, &chain)?;
     let denies = none ^ (verb == "there used to be");
-    Some(if denies {
-        readings.into_iter().map(|(w, c)| (w, c.into_iter().map(negate).collect())).collect()
-    } else {
-        readings
-    })
+    Some(if denies { readings.map(negate) } else { readings })
 }
 
 /// "Just past the entrance is the reception desk".
@@ -59,7 +55,10 @@ fn inverted(at: &mut Cursor) -> Option<Readings> {
     let verb = if at.eat_any(PRESENT).is_some() { None } else { Some(at.copula()?) };
     let figures = figures(at, true)?;
     let readings = located(&figures, &chain)?;
-    Some(verb.map_or(readings.clone(), |v| denied(readings, &v)))
+    Some(match verb {
+        Some(verb) => shaped(readings, &verb),
+        None => readings,
+    })
 }
 
 /// "The kitchen and the lounge are down the hall", "the last office on the left is Nick's".
@@ -77,7 +76,7 @@ fn said_of_places(at: &mut Cursor) -> Option<Readings> {
         return None;
     }
     let readings = predicate(at, &subjects, &told, &verb)?;
-    Some(denied(readings, &verb))
+    Some(shaped(readings, &verb))
 }
 
 /// The subjects with what tells them, each with its readings.
@@ -112,6 +111,13 @@ fn predicate(
         return if fit { located_told(subjects, told, &chain) } else { None };
     }
     *at = start;
+    if at.eat_any("right here|here").is_some() && (at.at_break() || at.sees("and|but")) {
+        // "The kitchen is here" names the place held.
+        let fit = subjects.iter().all(|s| fits(s, false) && s.determiner != Determiner::None);
+        let here = |s: &NounPhrase| label(Head::Here, s.phrase.clone(), Sameness::Open);
+        return fit.then(|| Readings::new(vec![(1.0, subjects.iter().map(here).collect())]));
+    }
+    *at = start;
     let ([subject], [readings]) = (subjects, told) else { return None };
     if !matches!(subject.kind, Kind::Place | Kind::Vague | Kind::Open)
         || subject.determiner == Determiner::Indefinite
@@ -120,7 +126,7 @@ fn predicate(
         return None;
     }
     let made = |make: &dyn Fn(Phrase) -> Vec<Content>| -> Option<Readings> {
-        Some(readings.iter().map(|(w, p)| (*w, make(p.clone()))).collect())
+        Some(Readings::new(readings.iter().map(|(w, p)| (*w, make(p.clone()))).collect()))
     };
     if at
         .eat_any(
@@ -168,13 +174,12 @@ fn identified(
     let chain = at.chain(true);
     let pairs = |make: &dyn Fn(&Phrase, &Phrase) -> Vec<Content>| {
         let others = chain.restrict(&other.phrase);
-        let mut out: Readings = readings
+        let all = readings
             .iter()
             .flat_map(|(w, a)| others.iter().map(move |(v, b)| (w * v, a, b)))
             .map(|(w, a, b)| (w, make(a, b)))
             .collect();
-        super::build::keep_best(&mut out);
-        Some(out)
+        Some(Readings::new(all))
     };
     let at_place = |figure: &Phrase, place: &Phrase| {
         vec![super::build::locate(figure, &Related::to(R::At, place.clone()))]
@@ -229,8 +234,8 @@ fn leads(at: &mut Cursor, subject: &NounPhrase) -> Option<Readings> {
 }
 
 pub(super) fn is_door(phrase: &Phrase) -> bool {
-    let Head::Named(name) = &phrase.head else { return false };
-    ["door", "doorway", "opening", "one"].iter().any(|d| name.as_str().ends_with(d))
+    let Head::Named(name) = &phrase.head else { return phrase.head == Head::Place };
+    ["door", "doorway", "opening"].iter().any(|d| name.as_str().ends_with(d))
 }
 
 /// The figures of a clause, without what follows them.
@@ -307,5 +312,5 @@ pub(super) fn said_further(at: &mut Cursor, first: &Content) -> Option<Readings>
     }
     let aka = at.sees("called|known as|also known as|also called");
     let verb = if aka { super::copula::PLAIN } else { at.copula()? };
-    Some(denied(predicate(at, &[subject], &told, &verb)?, &verb))
+    Some(shaped(predicate(at, &[subject], &told, &verb)?, &verb))
 }

@@ -34,10 +34,12 @@ mod notation;
 mod noun_phrase;
 mod numbers;
 mod parse;
+mod pointed;
 mod pointer;
 mod relate;
 mod relation;
 mod route;
+mod sentence;
 mod word_lists;
 mod words;
 

@@ -67,6 +67,10 @@ impl Cursor<'_> {
     pub(super) fn noun_phrase(&mut self) -> Option<NounPhrase> {
         let mut next = *self;
         let Start { determiner, sameness, mut features } = next.start();
+        if let Some(one) = next.one(determiner, &features) {
+            *self = next;
+            return Some(one);
+        }
         let mut words: Vec<(&Word, bool)> = Vec::new();
         while next.continues_name(&words) {
             if words.len() > MAX_NAME_WORDS {
@@ -85,6 +89,17 @@ impl Cursor<'_> {
         let kind = phrase.label()?.kind();
         *self = next;
         Some(NounPhrase { determiner, sameness, phrase, kind })
+    }
+
+    /// "The one" of "the one after the kitchen", the noun left out of "the second on the left".
+    fn one(&mut self, determiner: Determiner, features: &Features) -> Option<NounPhrase> {
+        let told = determiner == Determiner::Definite;
+        let left_out = features.ordinal.is_some() && self.sees("on|to|past|after|down|before|from");
+        if !(told && (left_out || self.eat_any("one|ones").is_some())) {
+            return None;
+        }
+        let phrase = Phrase { head: Head::Place, features: features.clone(), within: Vec::new() };
+        Some(NounPhrase { determiner, sameness: Sameness::Open, phrase, kind: Kind::Vague })
     }
 
     /// "Nick's", "mine", "yours": an owner without a noun.
@@ -186,7 +201,10 @@ impl Cursor<'_> {
             _ => return None,
         };
         // "The first on the left" has no noun; "first aid room" is a name.
-        (self.peek(1) != "aid" && !is_function_word(self.peek(1))).then_some(Ordinal::Nth(nth))
+        let noun_follows = !is_function_word(self.peek(1)) || self.peek(1) == "one";
+        let side_follows =
+            matches!(self.peek(1), "on" | "to" | "past" | "after" | "down" | "before" | "from");
+        (self.peek(1) != "aid" && (noun_follows || side_follows)).then_some(Ordinal::Nth(nth))
     }
 
     /// Does the word here belong to the name begun by `words`?

@@ -168,12 +168,17 @@ impl Cursor<'_> {
 
     fn with_landmark(&mut self, relation: Relation, modifiers: Modifiers) -> Option<Related> {
         if relation == R::Contains {
-            let thing = self.noun_phrase()?;
+            let thing =
+                self.noun_phrase().filter(|t| t.kind != Kind::No || t.determiner != Determiner::Definite)?;
             return Some(Related { modifiers, ..Related::to(relation, thing.phrase) });
         }
         let indefinite =
             self.sees("a|an|some|another") || (self.peek(0).ends_with('s') && self.peek(0) != "this");
         let (first, mut sure) = self.landmark()?;
+        if relation == R::On && !sure && matches!(first.head, Head::Named(_)) {
+            // "On the table" is where things are, not places.
+            return None;
+        }
         let here = matches!(first.head, Head::Here | Head::There);
         // One is near or away from here; "down here" says nothing of the kind.
         let pointless =
@@ -208,7 +213,7 @@ impl Cursor<'_> {
         let definite = matches!(read.determiner, Determiner::Definite | Determiner::Demonstrative);
         let fits = match read.kind {
             Kind::Place => true,
-            Kind::Thing => read.determiner != Determiner::None,
+            Kind::Thing => !matches!(read.determiner, Determiner::None | Determiner::Demonstrative),
             Kind::Open => definite,
             Kind::Vague => definite && (read.is_told() || read.determiner == Determiner::Demonstrative),
             Kind::No => false,
@@ -226,7 +231,9 @@ impl Cursor<'_> {
         let (of, along) = if left { (R::LeftOf, R::LeftSide) } else { (R::RightOf, R::RightSide) };
         if self.eat("of") {
             let (landmark, sure) = self.landmark()?;
-            let way = matches!(&landmark.head, Head::Named(name) if is_way(name.as_str()));
+            // Stairs have a left of their own, a hallway only sides.
+            let way =
+                matches!(&landmark.head, Head::Named(n) if is_way(n.as_str()) && n.as_str() != "stairs");
             return Some(Related { sure, ..Related::to(if way { along } else { of }, landmark) });
         }
         if self.sees("as you|when you|if you|once you") {
@@ -237,6 +244,18 @@ impl Cursor<'_> {
             "the" => Related::to(along, Phrase::new(Head::Path)),
             "my" => Related::to(of, Phrase::new(Head::Speaker)),
             "its" => Related::to(of, Phrase::new(Head::It)),
+            _ => Related::to(of, Phrase::new(Head::Agent)),
+        })
+    }
+
+    /// "… not the right": a side without its preposition.
+    pub(super) fn other_side(&mut self) -> Option<Related> {
+        let whose = self.eat_any("the|your|my")?;
+        let left = self.eat_any("left|right")? == "left";
+        let (of, along) = if left { (R::LeftOf, R::LeftSide) } else { (R::RightOf, R::RightSide) };
+        Some(match whose {
+            "the" => Related::to(along, Phrase::new(Head::Path)),
+            "my" => Related::to(of, Phrase::new(Head::Speaker)),
             _ => Related::to(of, Phrase::new(Head::Agent)),
         })
     }
@@ -279,7 +298,9 @@ impl Cursor<'_> {
         if self.eat_any("far away|far from here|a long way off").is_some() && self.at_break() {
             return Some(Related::to(R::AwayFrom, here()));
         }
-        if self.eat_any("over there|there").is_some() {
+        if !self.sees("there is|there are|there will|there should")
+            && self.eat_any("over there|there").is_some()
+        {
             return Some(Related::to(R::At, Phrase::new(Head::There)));
         }
         if self.eat_any("around the corner|round the corner|around that corner|around this corner").is_some()

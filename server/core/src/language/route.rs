@@ -50,14 +50,17 @@ pub(super) fn route_clause(at: &mut Cursor) -> Option<Readings> {
         vec![(1.0, None)]
     });
     let route = |then: Option<Content>| Content::Route { steps: steps.clone(), then: then.map(Box::new) };
-    Some(ends.into_iter().map(|(w, then)| (w, vec![route(then)])).collect())
+    Some(Readings::new(ends.into_iter().map(|(w, then)| (w, vec![route(then)])).collect()))
 }
 
 /// "… and the kitchen is on the right".
 fn end(at: &mut Cursor) -> Option<Weighed<Option<Content>>> {
+    if at.sees("that|this|these|here") {
+        return None;
+    }
     let readings = locate_clause(at).or_else(|| super::label::label_clause(at))?;
     let located = |all: Vec<Content>| all.into_iter().next().filter(|c| matches!(c, Content::Locate(_)));
-    readings.into_iter().map(|(w, all)| located(all).map(|c| (w, Some(c)))).collect()
+    readings.all.into_iter().map(|(w, all)| located(all).map(|c| (w, Some(c)))).collect()
 }
 
 fn step(at: &mut Cursor) -> Option<String> {
@@ -115,7 +118,9 @@ fn turn(at: &mut Cursor) -> Option<String> {
     }
     at.skip("turn|again|immediately");
     let mut said = format!("turn{nth} {}", way.trim_start_matches("back "));
-    if let Some(words) = at.eat_any(WHEN) {
+    if let Some(related) = at.related() {
+        said = format!("{} {said}", relation_notation(&related.restriction()));
+    } else if let Some(words) = at.eat_any(WHEN) {
         let (landmark, _) = at.landmark()?;
         said = format!("{} {} {said}", place_word(words), phrase_notation(&landmark));
     }
@@ -134,8 +139,18 @@ fn go(at: &mut Cursor) -> Option<String> {
             said.push("straight".to_owned());
             continue;
         }
-        at.skip("all the way|out|further|and");
-        let Some(related) = at.related() else { break };
+        at.skip("all the way|out|further");
+        let before = *at;
+        if at.eat("and")
+            && at.sees("turn|take|make|go|walk|you|the|it|continue|head|then|keep|enter|exit|bear")
+        {
+            *at = before;
+            break;
+        }
+        let Some(related) = at.related() else {
+            *at = before;
+            break;
+        };
         said.push(relation_notation(&related.restriction()));
     }
     if at.eat_any(UNTIL).is_some() {
