@@ -51,6 +51,12 @@ fn ask_place(at: &mut Cursor) -> Option<Content> {
         at.skip("now|exactly|right now");
         return at.at_break().then(|| ask(Question::Where, Phrase::new(Head::Here)));
     }
+    if at
+        .eat_any("where did we start|where did we begin|where did the tour start|where was the start")
+        .is_some()
+    {
+        return Some(ask(Question::Where, Phrase::new(Head::Start)));
+    }
     let indirect = at.eat_any(WHERE_INDIRECT).is_some();
     let kind = if indirect || at.eat_any(WHERE).is_some() {
         Question::Where

@@ -28,6 +28,15 @@ pub(super) struct Chain {
 impl Cursor<'_> {
     /// Reads a row of prepositional phrases; empty if none stands here.
     pub(super) fn chain(&mut self, contains: bool) -> Chain {
+        self.read_chain(contains, false)
+    }
+
+    /// Reads the row that begins a clause: "down the hall and to the right is the gym".
+    pub(super) fn leading_chain(&mut self) -> Chain {
+        self.read_chain(false, true)
+    }
+
+    fn read_chain(&mut self, contains: bool, leading: bool) -> Chain {
         let mut chain = Chain { definite: true, links: Vec::new() };
         while chain.links.len() < CHAIN_MAX {
             let start = *self;
@@ -39,7 +48,10 @@ impl Cursor<'_> {
             }
             match self.related() {
                 // "With" says what a place has, not where it lies.
-                Some(r) if (contains || r.relation != R::Contains) && !(apart && self.sees(COPULA)) => {
+                Some(r)
+                    if (contains || r.relation != R::Contains)
+                        && (leading || !apart || !self.sees(COPULA)) =>
+                {
                     chain.definite &= r.definite;
                     chain.links.push((r, apart));
                 }

@@ -90,6 +90,14 @@ pub(super) fn shaped(readings: Readings, copula: &Copula) -> Readings {
 pub(super) fn negate(content: Content) -> Content {
     match content {
         Content::Negate(inner) => *inner,
+        // Not another lobby: the same; not the same: another.
+        Content::Label { at, what, sameness: Sameness::Same } => {
+            Content::Label { at, what, sameness: Sameness::Other }
+        }
+        Content::Label { at, what, sameness: Sameness::Other } => {
+            Content::Label { at, what, sameness: Sameness::Same }
+        }
+        Content::Same { what, like, same } => Content::Same { what, like, same: !same },
         other => Content::Negate(Box::new(other)),
     }
 }

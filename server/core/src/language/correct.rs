@@ -31,7 +31,16 @@ pub(super) fn renaming(at: &mut Cursor) -> Option<Readings> {
         return Some(renamed);
     }
     *at = start;
-    at.eat_any("i called this place|i called this|i said this is|i said this was|i said that this was|i told you this was|i said we were in|i thought this was")?;
+    if let Some(said) = not_but(at) {
+        return Some(said);
+    }
+    *at = start;
+    if let Some(said) = meant(at) {
+        return Some(said);
+    }
+    *at = start;
+    at.eat_any(
+        "i called this place|i called this|i said this is|i said this was|i said that this was|i told you this was|i said we were in|i thought this was")?;
     let was = named(at)?;
     at.skip(",");
     at.eat_any("but|and")?;
@@ -40,6 +49,32 @@ pub(super) fn renaming(at: &mut Cursor) -> Option<Readings> {
     let is = named(at).filter(plausible)?;
     let said = |what: Phrase| Box::new(label(Head::Here, what, Sameness::Open));
     Some(one(Content::Correct { was: Some(said(was.phrase)), is: said(is.phrase) }))
+}
+
+/// "Not the kitchen, the gym".
+fn not_but(at: &mut Cursor) -> Option<Readings> {
+    at.eat_any("not")?;
+    let was = named(at).filter(plausible)?;
+    at.eat_any(",|but")?;
+    at.skip("but|it is|this is|rather|we are in");
+    let is = named(at).filter(plausible)?;
+    let said = |what: Phrase| Box::new(label(Head::Here, what, Sameness::Open));
+    Some(one(Content::Correct { was: Some(said(was.phrase)), is: said(is.phrase) }))
+}
+
+/// "I meant the gym, not the kitchen".
+fn meant(at: &mut Cursor) -> Option<Readings> {
+    if !matches!(at.before(), "mean" | "meant") {
+        return None;
+    }
+    let said = |what: Phrase| Box::new(label(Head::Here, what, Sameness::Open));
+    let is = named(at).filter(plausible)?;
+    let was = match at.eat_any(", not|not|, and not") {
+        Some(_) => Some(said(named(at).filter(plausible)?.phrase)),
+        None => None,
+    };
+    let is = said(is.phrase);
+    at.at_end().then(|| one(Content::Correct { was, is }))
 }
 
 fn thing_called(at: &mut Cursor) -> Option<Readings> {

@@ -48,7 +48,7 @@ fn never_there(at: &mut Cursor) -> Option<Content> {
     let quantity = at.quantity_adverb().filter(|_| there)?;
     at.skip("be|is|are");
     at.eat_any("find|finds|see|have|will find");
-    let figure = at.noun_phrase().filter(|p| p.kind == Kind::Place)?;
+    let figure = at.noun_phrase().filter(|p| matches!(p.kind, Kind::Place | Kind::Thing))?;
     let related = at.related()?;
     let landmark = related.landmarks.into_iter().next()?;
     Some(Content::Generic {

@@ -23,7 +23,7 @@ const ON_FLOOR: &str = "of the building|of this building|in this building|in the
 /// Reads a clause that names a place pointed at, or says where it lies.
 pub(super) fn label_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
-    for form in [welcome, people_call, presented_here, pointed, we_are] {
+    for form in [welcome, people_call, presented_here, passed, pointed, we_are] {
         if let Some(readings) = form(at) {
             return Some(readings);
         }
@@ -74,6 +74,17 @@ fn presented_here(at: &mut Cursor) -> Option<Readings> {
     )?;
     let phrase = named(at).filter(plausible)?;
     Some(called(at, Head::Here, phrase, false))
+}
+
+/// "We just passed the library".
+fn passed(at: &mut Cursor) -> Option<Readings> {
+    at.eat_any(
+        "we have just passed|we just passed|we have just left|we just left|we just came from|we just came out of|\
+         we have just come from|we have just come out of|you just passed|you have just passed|we were just in|\
+         we just walked past|we just walked out of|we just exited",
+    )?;
+    let phrase = named(at).filter(plausible)?;
+    Some(called(at, Head::Previous, phrase, false))
 }
 
 /// "We are back in the gym", "we are next to the gym", "we have been here before".

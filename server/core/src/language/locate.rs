@@ -10,6 +10,7 @@ use super::describe::attribute;
 use super::label::{named, plausible};
 use super::names::Kind;
 use super::noun_phrase::{Determiner, NounPhrase};
+use super::pointed::where_kept;
 use super::relate::Related;
 use super::relation::Relation as R;
 
@@ -24,13 +25,24 @@ const PRESENT: &str = "there is also|there are also|there is|there are|there wil
 /// Reads a clause that locates something.
 pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
-    for form in [presented, inverted, said_of_places] {
+    for form in [wanted, presented, inverted, said_of_places] {
         if let Some(readings) = form(at) {
             return Some(readings);
         }
         *at = start;
     }
     None
+}
+
+/// "If you are looking for the library, it's down the hall".
+fn wanted(at: &mut Cursor) -> Option<Readings> {
+    at.eat_any(
+        "if you are looking for|if you need|if you want|if you are going to|if you have to go to|for",
+    )?;
+    let figures = figures(at, true)?;
+    at.skip(",|then");
+    at.eat_any("it is|they are|that is|you can find it|you will find it|you can find them")?;
+    located(&figures, &at.chain(false))
 }
 
 /// "There is a lab next to the gym", "you can find the copier in the mail room".
@@ -49,7 +61,7 @@ fn presented(at: &mut Cursor) -> Option<Readings> {
 /// "Just past the entrance is the reception desk".
 fn inverted(at: &mut Cursor) -> Option<Readings> {
     at.skip("here|over here|up here|down here");
-    let chain = at.chain(false);
+    let chain = at.leading_chain();
     chain.first()?;
     at.skip(",");
     let verb = if at.eat_any(PRESENT).is_some() { None } else { Some(at.copula()?) };
@@ -71,6 +83,12 @@ fn said_of_places(at: &mut Cursor) -> Option<Readings> {
         return Some(readings);
     }
     *at = start;
+    if let ([subject], [readings]) = (subjects.as_slice(), told.as_slice())
+        && at.eat_any("belongs to|belong to").is_some()
+    {
+        return belongs(at, subject, readings);
+    }
+    *at = start;
     let verb = at.copula()?;
     if verb.quantity.is_some() {
         return None;
@@ -83,15 +101,21 @@ fn said_of_places(at: &mut Cursor) -> Option<Readings> {
 fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> {
     let mut plain = Vec::new();
     let mut told = Vec::new();
+    at.skip("both");
     loop {
         let mut subject = at.noun_phrase()?;
+        let relative = at.eat_any(", which is|, which are|, located|, situated").is_some();
         let chain = at.chain(true);
+        if relative && (chain.is_empty() || at.at_end()) {
+            return None;
+        }
         at.skip(",");
         let readings = chain.restrict(&subject.phrase);
         subject.phrase = readings.first().map_or(subject.phrase, |(_, p)| p.clone());
         plain.push(subject);
         told.push(readings);
-        if plain.len() >= MAX_FIGURES || at.eat_any("and also|as well as|and").is_none() {
+        let more = at.eat_any("and also|as well as|and").is_some() || (at.before() == "," && at.lists());
+        if plain.len() >= MAX_FIGURES || !more {
             return Some((plain, told));
         }
     }
@@ -139,6 +163,14 @@ fn predicate(
     }
     if let Some(owner) = at.owner_alone() {
         return made(&|what| vec![Content::Alias { also: owned(&what, &owner), what }]);
+    }
+    *at = start;
+    if let Some(like) = at.pointer().filter(|p| matches!(p.head, Head::Start | Head::Previous)) {
+        return made(&|what| vec![Content::Same { what, like: like.clone(), same: true }]);
+    }
+    *at = start;
+    if let Some(also) = where_kept(at) {
+        return made(&|what| vec![Content::Alias { what, also: also.clone() }]);
     }
     *at = start;
     if at
@@ -214,6 +246,15 @@ fn owned(what: &Phrase, owner: &Owner) -> Phrase {
     let mut owned = Phrase::new(what.head.clone());
     owned.features.owner = Some(owner.clone());
     owned
+}
+
+/// "The office by the window belongs to Anna".
+fn belongs(at: &mut Cursor, subject: &NounPhrase, readings: &Weighed<Phrase>) -> Option<Readings> {
+    let owner = if at.eat("me") { Owner::Speaker } else { Owner::Named(at.person()?) };
+    let place = subject.kind == Kind::Place || (subject.kind == Kind::Vague && subject.is_told());
+    let all =
+        readings.iter().map(|(w, p)| (*w, vec![Content::Alias { also: owned(p, &owner), what: p.clone() }]));
+    place.then(|| Readings::new(all.collect()))
 }
 
 /// "This hallway leads to the gym".

@@ -127,6 +127,24 @@ impl Cursor<'_> {
         None
     }
 
+    /// Does a list of noun phrases go on here: "…, the lounge and the gym"?
+    pub(super) fn lists(&self) -> bool {
+        let mut next = *self;
+        next.noun_phrase().is_some() && (next.sees("and") || (next.eat(",") && next.sees("the|and")))
+    }
+
+    /// A person's name of up to three words.
+    pub(super) fn person(&mut self) -> Option<String> {
+        let mut said = Vec::new();
+        while said.len() < 3
+            && let Some(word) = self.word().filter(|w| w.text != COMMA && !is_function_word(&w.text))
+        {
+            said.push(word);
+            self.step();
+        }
+        (!said.is_empty()).then(|| owned_by(&said))
+    }
+
     fn start(&mut self) -> Start {
         use Determiner::{Definite, Demonstrative, Indefinite, None, Possessive};
         let begins = [
@@ -186,7 +204,8 @@ impl Cursor<'_> {
     /// The ordinal that the word here is, before a noun ("second floor lobby" is a name).
     fn ordinal(&self) -> Option<Ordinal> {
         let nth = match self.peek(0) {
-            "next" if !matches!(self.peek(1), "to" | "door") => return Some(Ordinal::Next),
+            "next" if self.peek(1) == "door" && self.before() != "the" => return None,
+            "next" if self.peek(1) != "to" => return Some(Ordinal::Next),
             "last" | "final" => return Some(Ordinal::Last),
             "first" | "1st" => 1,
             "second" | "2nd" => 2,

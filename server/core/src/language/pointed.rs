@@ -166,6 +166,14 @@ pub(super) fn same_place(at: &mut Cursor, head: &Head) -> Option<Content> {
     }
     at.eat_any("the very same|the exact same|the same")?;
     at.eat_any("place|one|room|spot|area|location")?;
+    if at
+        .eat_any(
+            "where we started|that we started|we started from|we started in|we started at|we started|we came in|we began",
+        )
+        .is_some()
+    {
+        return Some(Content::Same { what, like: Phrase::new(Head::Start), same: true });
+    }
     let like = if at.eat_any("as before|as earlier|as last time|again|as the one before|we saw before|we were in before|we were in earlier|as we were in before").is_some() || at.at_break() {
         Phrase::new(Head::Visited)
     } else {
@@ -176,7 +184,7 @@ pub(super) fn same_place(at: &mut Cursor, head: &Head) -> Option<Content> {
 }
 
 /// "Where we keep the printers", "where people eat".
-fn where_kept(at: &mut Cursor) -> Option<Phrase> {
+pub(super) fn where_kept(at: &mut Cursor) -> Option<Phrase> {
     at.eat_any("the place where|the room where|where")?;
     let mut place = Phrase::new(Head::Place);
     if at.eat_any("all the|the|all").is_some() || at.at_break() {

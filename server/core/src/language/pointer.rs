@@ -14,7 +14,8 @@ const START: &str = "where we started out|where we started from|where we started
     the beginning of the tour|the spot where we started";
 const PREVIOUS: &str = "where we just were|where we were just now|where we were before|where we were|\
     where we just came from|where we came from|the previous room|the previous place|the previous one|\
-    the last room we were in|the last place we were in|the last room we saw|the last place|the last room|the last one";
+    the last room we were in|the last place we were in|the last room we saw|the last place|the last room|the last one|the room before this one|the one before this one|\
+    the one before this|the room before this|the place before this one|the place before this";
 const VISITED: &str = "a place we have seen|a place we have been to|somewhere we have been|a room we have been in|\
     a place we have been before|a place we have visited|a room we have seen";
 
@@ -70,7 +71,7 @@ impl Cursor<'_> {
             let left = self.eat_any("we|you|i").is_some()
                 && {
                     self.skip("have|had|just|all");
-                    self.eat_any("left behind|left|came out of|came from|were in|were at|exited|were|passed through|visited|saw|came through")
+                    self.eat_any("were just in|were just at|were last in|left behind|left|came out of|came from|were in|were at|exited|were|passed through|visited|saw|came through")
                     .is_some()
                 };
             if left {
@@ -79,7 +80,7 @@ impl Cursor<'_> {
             }
             *self = start;
         }
-        let previous = self.eat_any(PREVIOUS).is_some() && !self.sees("on|before|to|in|at");
+        let previous = self.eat_any(PREVIOUS).is_some() && !self.sees("on|before|to|in|at|past|after");
         if !previous {
             *self = start;
         }

@@ -49,8 +49,8 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ("across", R::Across),
     ("through to|through|in through|via|by way of", R::Through),
     (
-        "at the very end of|at the far end of|at the other end of|at the opposite end of|at the back end of|at the end of|\
-      to the end of|near the end of|by the end of|in the end of|down at the end of",
+        "at the very end of|at the far end of|at the other end of|at the opposite end of|at either end of|at both ends of|at the back end of|at the end of|\
+      to the end of|near the end of|by the end of|in the end of|down at the end of|towards the end of|toward the end of",
         R::AtEndOf,
     ),
     (
@@ -64,7 +64,10 @@ const PREPOSITIONS: [(&str, R); 34] = [
         R::Near,
     ),
     ("along", R::Along),
-    ("down|up", R::Down),
+    (
+        "down the hall from|down the hallway from|down the corridor from|up the hall from|down from|down|up",
+        R::Down,
+    ),
     ("past|passed|beyond|after|on past|once you pass|just after you pass", R::Past),
     ("around|round", R::Around),
     ("out of|outside of|outside", R::OutOf),
@@ -73,10 +76,10 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ("on the way to|en route to|towards|toward|in the direction of", R::Towards),
     ("on top of|above|over", R::Above),
     ("underneath|below|beneath|under", R::Below),
-    ("to the north of|north of", R::NorthOf),
-    ("to the south of|south of", R::SouthOf),
-    ("to the east of|east of", R::EastOf),
-    ("to the west of|west of", R::WestOf),
+    ("to the north of|on the north side of|at the north end of|north of", R::NorthOf),
+    ("to the south of|on the south side of|at the south end of|south of", R::SouthOf),
+    ("to the east of|on the east side of|at the east end of|east of", R::EastOf),
+    ("to the west of|on the west side of|at the west end of|west of", R::WestOf),
     ("upstairs from", R::LevelUp),
     ("downstairs from", R::LevelDown),
     ("at the top of|at the bottom of|at the foot of|at the head of|at the corner of|at the base of", R::At),
@@ -181,8 +184,20 @@ impl Cursor<'_> {
         }
         let here = matches!(first.head, Head::Here | Head::There);
         // One is near or away from here; "down here" says nothing of the kind.
-        let pointless =
-            here && !matches!(relation, R::Near | R::AwayFrom | R::NextTo | R::Past | R::Across | R::At);
+        let pointless = here
+            && !matches!(
+                relation,
+                R::Near
+                    | R::AwayFrom
+                    | R::NextTo
+                    | R::Past
+                    | R::Across
+                    | R::At
+                    | R::NorthOf
+                    | R::SouthOf
+                    | R::EastOf
+                    | R::WestOf
+            );
         let upward = matches!(first.head, Head::Agent | Head::Speaker)
             && !matches!(
                 relation,
@@ -215,6 +230,7 @@ impl Cursor<'_> {
             Kind::Place => true,
             Kind::Thing => !matches!(read.determiner, Determiner::None | Determiner::Demonstrative),
             Kind::Open => definite,
+            Kind::Vague if read.name().is_some_and(|n| n.as_str() == "building") => definite,
             Kind::Vague => definite && (read.is_told() || read.determiner == Determiner::Demonstrative),
             Kind::No => false,
         };
@@ -224,6 +240,15 @@ impl Cursor<'_> {
     /// "On your left", "to the right of the stairs", "on the left side of the hallway".
     fn side(&mut self) -> Option<Related> {
         self.skip("off|over|up|immediately");
+        if let Some(way) = self.eat_any("to the north|to the south|to the east|to the west") {
+            let relation = match way {
+                "to the north" => R::NorthOf,
+                "to the south" => R::SouthOf,
+                "to the east" => R::EastOf,
+                _ => R::WestOf,
+            };
+            return (self.peek(0) != "of").then(|| Related::to(relation, Phrase::new(Head::Here)));
+        }
         self.eat_any("on|to|at")?;
         let whose = self.eat_any("the|your|my|our|its")?;
         let left = self.eat_any("left|right")? == "left";
@@ -384,6 +409,8 @@ impl Cursor<'_> {
         let lead = match (self.peek(0), self.peek(1), self.peek(2)) {
             ("a", "couple", "of") => return Some((2.0, 3)),
             ("a", "couple", _) => return Some((2.0, 2)),
+            // "A few" is three in most ears.
+            ("a", "few", _) => return Some((3.0, 2)),
             ("a", "hundred", _) => return Some((100.0, 2)),
             ("a", "dozen", _) => return Some((12.0, 2)),
             ("a", ..) => return Some((1.0, 1)),

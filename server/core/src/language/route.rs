@@ -31,7 +31,8 @@ pub(super) fn route_clause(at: &mut Cursor) -> Option<Readings> {
         {
             break;
         }
-        at.skip("please|just|first|then|you|you have to|you need to|you should|you can|you want to|you will want to|immediately");
+        at.skip("please|just|first|then|if you|as you|when you|once you|after you|you have to|you need to|you should|\
+             you can|you want to|you will want to|you|immediately");
         match step(at).filter(|_| steps.len() < STEPS_MAX) {
             Some(step) => steps.push(step),
             None => {
