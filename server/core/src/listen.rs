@@ -186,7 +186,7 @@ fn plain(act: &Act) -> Option<Told> {
         Content::Label { at, what, sameness } if at.head == Head::Here => {
             Some(Told::Label { name: what.label()?, again: *sameness })
         }
-        Content::Locate(Locate { figure, relation, landmarks, .. }) => {
+        Content::Locate(Locate { figure, relation, landmarks, repaired: false, .. }) => {
             let [landmark] = landmarks.as_slice() else { return None };
             let landmark = if landmark.head == Head::Here { None } else { Some(bare(landmark)?) };
             Some(Told::Locate { figure: bare(figure)?, relation: *relation, landmark })

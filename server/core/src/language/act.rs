@@ -1,6 +1,6 @@
 //! What a text says, typed: analyses of acts, acts of phrases. `notation.rs` has the written form.
 
-use super::names::Name;
+use super::names::{Kind, Name};
 use super::relation::Relation;
 use serde::{Deserialize, Serialize};
 
@@ -375,6 +375,11 @@ impl Phrase {
     /// The canonical full name, which is the map's label: "stata cafeteria", "lecture hall one twenty
     /// three", "nick's office"; none for pointers and mere descriptions.
     pub fn label(&self) -> Option<Name> {
+        self.full_name().filter(|name| name.kind() != Kind::Vague)
+    }
+
+    /// The name as [`label`](Self::label) has it, "the room" included.
+    pub(super) fn full_name(&self) -> Option<Name> {
         let Head::Named(head) = &self.head else { return None };
         let f = &self.features;
         let mut words = Vec::new();

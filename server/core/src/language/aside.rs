@@ -11,11 +11,11 @@ const IDIOMS: &str = "in the dumps|the point of caring|the point of no return|ov
     in the loop|out of the loop|under the table|around the clock|on thin ice|up the creek|the end of my rope|\
     in the doghouse|by the book|over the hill|off the wall|up the wall|down the rabbit hole|the elephant in the room|\
     at a crossroads|on the ball|in the zone|in the bag|off the hook|on the house|in the pipeline|the light at the end|\
-    behind closed doors|on the back burner|in the long run|in the driver's seat|between the lines|past it|\
-    beyond the pale|over the top|under the radar|in the spotlight|through thick and thin|out of the blue|\
-    out to lunch|at the end of the day|around the block|at death's door|a foot in the door|in the works|\
-    in seventh heaven|in the clear|in the red|in the black|on the rocks|on the edge|up to here|down the tubes|\
-    on the table|off the table|in the gutter|in the toilet|down the toilet|out the window|through the wringer";
+    behind closed doors|on the back burner|in the long run|in the driver's seat|between the lines|\
+    beyond the pale|under the radar|in the spotlight|through thick and thin|out of the blue|\
+    out to lunch|at the end of the day|at death's door|a foot in the door|in the works|\
+    in seventh heaven|in the clear|in the red|in the black|on the rocks|up to here|down the tubes|\
+    on the table|off the table|in the gutter|in the toilet|down the toilet|through the wringer";
 /// Verbs that order something.
 const ORDERS: [&str; 60] = [
     "angle", "be", "bring", "call", "charge", "check", "clean", "close", "come", "continue", "cross",

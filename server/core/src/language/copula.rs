@@ -16,6 +16,8 @@ pub(super) struct Copula {
     pub(super) certainty: f64,
     /// "Was".
     pub(super) past: bool,
+    /// "Will be".
+    pub(super) future: bool,
     /// "Used to be", "is no longer".
     pub(super) former: bool,
     /// "Actually": against what was said before.
@@ -30,6 +32,7 @@ pub(super) const PLAIN: Copula = Copula {
     negated: false,
     certainty: 1.0,
     past: false,
+    future: false,
     former: false,
     corrects: false,
     quantity: None,
@@ -54,6 +57,7 @@ impl Cursor<'_> {
         };
         c.negated = verb.contains(" not ");
         c.past = matches!(verb, "was" | "were");
+        c.future = verb.starts_with("will") || verb.contains("going to");
         c.former = verb == "used to be";
         c.certainty *= match verb {
             "might not be" | "might be" | "may not be" | "may be" | "could be" | "can be" => EVEN,

@@ -24,6 +24,12 @@ fn names_place(name: &str) -> bool {
     concept(name).is_some_and(|t| !matches!(t, Type::Thing | Type::Region))
 }
 
+/// All known places of one word.
+pub(super) fn places() -> impl Iterator<Item = &'static str> {
+    let concepts = CONCEPTS.iter().map(|(lemma, ..)| *lemma).filter(|l| names_place(l) && !l.contains(' '));
+    concepts.chain(PLACES.iter().copied())
+}
+
 /// Does this noun name a place by itself ("lobby")?
 pub(super) fn is_place(word: &str) -> bool {
     listed(PLACES, word) || (names_place(word) && !is_generic(word))

@@ -13,6 +13,7 @@ use super::noun_phrase::{Determiner, NounPhrase};
 use super::pointed::where_kept;
 use super::relate::Related;
 use super::relation::Relation as R;
+use super::repair::{guessed, mended};
 
 /// Figures of one clause ("the kitchen and the lounge are …").
 const MAX_FIGURES: usize = 4;
@@ -131,8 +132,15 @@ fn predicate(
     let start = *at;
     let chain = at.chain(false);
     if !chain.is_empty() && !verb.past {
-        let fit = subjects.iter().all(|s| fits(s, false));
-        return if fit { located_told(subjects, told, &chain) } else { None };
+        if subjects.iter().all(|s| fits(s, false)) {
+            return located_told(subjects, told, &chain);
+        }
+        let [subject] = subjects else { return None };
+        let plain =
+            subject.kind == Kind::No && subject.determiner == Determiner::Definite && !subject.is_told();
+        let figure = mended(&subject.phrase).filter(|_| plain && chain.sure())?;
+        let meant = NounPhrase { phrase: figure, kind: Kind::Place, ..subject.clone() };
+        return located(&[meant], &chain).and_then(guessed);
     }
     *at = start;
     if at.eat_any("right here|here").is_some() && (at.at_break() || at.sees("and|but")) {

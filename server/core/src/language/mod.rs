@@ -38,8 +38,11 @@ mod pointed;
 mod pointer;
 mod relate;
 mod relation;
+mod repair;
 mod route;
 mod sentence;
+#[cfg(test)]
+mod tests;
 mod word_lists;
 mod words;
 

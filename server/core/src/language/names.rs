@@ -1,8 +1,8 @@
 //! Names of places: one spelling for all that people say and write for the same.
 
 use super::lexicon::{
-    is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise, is_thing, is_weak,
-    singular, unified,
+    concept, hypernym, is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise,
+    is_thing, is_weak, singular, unified,
 };
 use super::normalise::{COMMA, sentences};
 use super::numbers::{is_number, numbers_as_spoken};
@@ -55,6 +55,12 @@ impl Name {
     /// The canonical spelling.
     pub fn as_str(&self) -> &str {
         &self.0
+    }
+
+    /// The kind of its concept, if the lexicon has one: "lobby" for an elevator lobby, "lab" for a robotics
+    /// lab.
+    pub fn hypernym(&self) -> Option<&str> {
+        hypernym(&self.0).or_else(|| self.0.split_once(' ').and_then(|(_, last)| concept(last).map(|_| last)))
     }
 
     /// What speaks for it being a place's name.
@@ -231,7 +237,7 @@ mod tests {
             ("information desk", Kind::Place),
             ("Z-center", Kind::Place),
             ("department of linguistics", Kind::Place),
-            ("mural", Kind::Open),
+            ("fishbowl", Kind::Open),
             ("vending machines", Kind::Place),
             ("large room", Kind::Vague),
             ("next room", Kind::No),

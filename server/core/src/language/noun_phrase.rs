@@ -34,7 +34,7 @@ pub(super) struct NounPhrase {
 impl NounPhrase {
     /// Its label or, for a mere description, the name of its kind.
     pub(super) fn name(&self) -> Option<Name> {
-        self.phrase.label()
+        self.phrase.full_name()
     }
 
     pub(super) fn is_plural(&self) -> bool {
@@ -86,7 +86,7 @@ impl Cursor<'_> {
         let rest = proper(rest, &mut features);
         let head: Vec<&str> = rest.iter().map(|(w, _)| w.text.as_str()).collect();
         let phrase = Phrase { head: Head::Named(Name::from_words(&head)?), features, within: Vec::new() };
-        let kind = phrase.label()?.kind();
+        let kind = phrase.full_name()?.kind();
         *self = next;
         Some(NounPhrase { determiner, sameness, phrase, kind })
     }

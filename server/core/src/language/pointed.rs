@@ -13,6 +13,7 @@ use super::relation::Relation as R;
 
 /// "This is the gym", "that was not the lounge", "it's the second door on the right".
 pub(super) fn pointed(at: &mut Cursor) -> Option<Readings> {
+    let spot = at.sees(SPOT);
     let head = subject(at)?;
     let verb = at.copula()?;
     let head = match head {
@@ -20,7 +21,11 @@ pub(super) fn pointed(at: &mut Cursor) -> Option<Readings> {
         Head::Here | Head::There | Head::It if verb.past => return None,
         head => head,
     };
-    predicate(at, head, &verb).map(|readings| shaped(readings, &verb))
+    if verb.future {
+        // "This will be the gym" is not the gym yet.
+        return None;
+    }
+    predicate(at, head, spot, &verb).map(|readings| shaped(readings, &verb))
 }
 
 fn subject(at: &mut Cursor) -> Option<Head> {
@@ -47,7 +52,7 @@ fn subject(at: &mut Cursor) -> Option<Head> {
 }
 
 /// What is said of the place pointed at.
-fn predicate(at: &mut Cursor, head: Head, verb: &Copula) -> Option<Readings> {
+fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<Readings> {
     let start = *at;
     if at
         .eat_any(
@@ -55,7 +60,8 @@ fn predicate(at: &mut Cursor, head: Head, verb: &Copula) -> Option<Readings> {
         )
         .is_some()
     {
-        return named(at).map(|p| called(at, head, p, false));
+        // "This place is called Nirvana"; "this is called teamwork" is less clear.
+        return named(at).filter(|p| spot || plausible(p)).map(|p| called(at, head, p, false));
     }
     if let Some(same) = same_place(at, &head) {
         return Some(one(same));

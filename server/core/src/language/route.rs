@@ -85,7 +85,7 @@ fn fork(at: &mut Cursor) -> Option<String> {
         _ => "fork",
     };
     at.skip(",|then");
-    step(at).map(|next| format!("at {place} {next}"))
+    turn(at).or_else(|| go(at)).map(|next| format!("at {place} {next}"))
 }
 
 /// "When you reach the elevators, turn left".

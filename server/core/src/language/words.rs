@@ -97,7 +97,8 @@ fn located(locate: &Locate) -> String {
         modifiers: locate.modifiers,
         landmarks: locate.landmarks.clone(),
     });
-    format!("{} {} {place}", said(&locate.figure), verb(&locate.figure))
+    let guess = if locate.repaired { ", if I heard the name right" } else { "" };
+    format!("{} {} {place}{guess}", said(&locate.figure), verb(&locate.figure))
 }
 
 fn related(r: &Restriction) -> String {
@@ -135,6 +136,7 @@ fn fixed(r: &Restriction) -> Option<String> {
         (Relation::AheadOf, Head::Agent) => "straight ahead",
         (Relation::LevelUp, Head::Here) => "upstairs",
         (Relation::LevelDown, Head::Here) => "downstairs",
+        (Relation::NextTo, Head::Here) => "next door",
         (Relation::At, Head::There) => "there",
         (Relation::At, Head::Here) => "here",
         _ => return None,
