@@ -15,7 +15,7 @@ use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Groundings less probable are not kept.
-const GROUNDED_MIN: f64 = 0.005;
+const GROUNDED_MIN: f64 = 0.002;
 /// Descriptions grounded again per place, in turn.
 const AGAIN_PER_PLACE: usize = 1;
 /// "This hallway" and "the nearest exit" are about so near.

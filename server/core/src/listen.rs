@@ -6,8 +6,8 @@ use crate::filter::Filter;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::Source;
-use crate::language::act::{Content, Locate, Parse, Phrase};
-use crate::language::{self, Name};
+use crate::language;
+use crate::language::act::{Content, Locate, Parse};
 use crate::ledger::{Entry, UTTERANCES_MAX};
 use crate::particle::Particle;
 use std::collections::BTreeMap;
@@ -51,8 +51,8 @@ impl Filter {
             return heard(u, HeardStatus::Refused, &Parse::default(), words);
         }
         if self.ledger.has(&u.id) {
-            let parse = language::understand(&u.text, &u.alternatives);
-            let words = format!("{} (I had heard that already.)", language::words(&u.text));
+            let parse = language::parse_hearings(&u.text, &u.alternatives);
+            let words = format!("{} (I had heard that already.)", self.words(&parse));
             return heard(u, HeardStatus::Understood, &parse, words);
         }
         let retracted =
@@ -65,9 +65,9 @@ impl Filter {
     }
 
     fn hear_anew(&mut self, u: &Utterance, here: &Here) -> Heard {
-        let parse = language::understand(&u.text, &u.alternatives);
-        let words = language::words(&u.text);
-        if parse.best().is_none() {
+        let parse = language::parse_hearings(&u.text, &u.alternatives);
+        let words = self.words(&parse);
+        if parse.acts().iter().all(|act| matches!(act.content, Content::Ignored(_))) {
             return heard(u, HeardStatus::NotUnderstood, &parse, words);
         }
         if !parse.acts().iter().any(|act| act.content.asserts()) {
@@ -81,7 +81,6 @@ impl Filter {
             let words = format!("{words} But I can't keep more than {UTTERANCES_MAX} sentences.");
             return heard(u, HeardStatus::Refused, &parse, words);
         }
-        let unknown = self.unknown_landmarks(&parse);
         let entry = Entry {
             id: u.id.clone(),
             stamp_ns: u.began_ns,
@@ -93,7 +92,7 @@ impl Filter {
         let describes = locates(&parse).next().is_some();
         let number = Arc::make_mut(&mut self.ledger).enter(entry, describes);
         self.take_in(number, &parse, held, here);
-        let mut heard = heard(u, HeardStatus::Understood, &parse, words + &not_known(&unknown));
+        let mut heard = heard(u, HeardStatus::Understood, &parse, words);
         heard.grounded = self.told(number);
         if describes {
             heard.words += &self.put(&heard.grounded, held, here);
@@ -117,13 +116,8 @@ impl Filter {
         format!(" I think that is {distance_m:.0} m from here, {side}.")
     }
 
-    /// Names of landmarks that nobody has taught.
-    fn unknown_landmarks(&self, parse: &Parse) -> Vec<Name> {
-        let landmarks = locates(parse).flat_map(|(_, l)| &l.landmarks).filter(|p| !p.features.this);
-        let mut unknown: Vec<Name> = landmarks.filter_map(Phrase::label).collect();
-        unknown.retain(|name| self.ledger.label(name.as_str()).is_none());
-        unknown.dedup();
-        unknown
+    fn words(&self, parse: &Parse) -> String {
+        language::words(parse.acts(), |name| self.ledger.label(name.as_str()).is_some())
     }
 
     /// Where the best particle put an utterance, likeliest first.
@@ -154,12 +148,6 @@ pub(crate) fn locates(parse: &Parse) -> impl Iterator<Item = (f64, &Locate)> {
             _ => None,
         })
     })
-}
-
-fn not_known(names: &[Name]) -> String {
-    let told =
-        |n: &Name| format!(" I don't know {} yet: I'll work it out when you show me.", n.with_article());
-    names.iter().map(told).collect()
 }
 
 fn heard(u: &Utterance, status: HeardStatus, parse: &Parse, words: String) -> Heard {

@@ -1,6 +1,6 @@
 //! What a text says, typed: analyses of acts, acts of phrases. `notation.rs` has the written form.
 
-use super::names::Name;
+use super::names::{Kind, Name};
 use super::relation::Relation;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,8 @@ pub struct Analysis {
     pub acts: Vec<Act>,
     /// The acts in writing.
     pub notation: String,
+    /// Which hearing it reads: 0 the text itself, k the k-th of its alternatives.
+    pub hearing: usize,
 }
 
 /// One thing said.
@@ -137,7 +139,7 @@ pub struct Phrase {
 /// What a phrase speaks of.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Head {
-    /// A kind of place or thing, compounds whole: `elevator lobby`.
+    /// A kind of place or thing, compounds and numbers whole: `elevator lobby`, `room one oh five`.
     Named(Name),
     /// Some place, described alone: "where we keep the printers".
     Place,
@@ -161,6 +163,8 @@ pub enum Head {
     Unknown,
     /// Any place: "the thing I called the lobby".
     Any,
+    /// Some place seen before: "we have been here before".
+    Visited,
 }
 
 /// What tells a place from others of its kind.
@@ -168,8 +172,6 @@ pub enum Head {
 pub struct Features {
     /// "Stata" of "the Stata cafeteria", as written.
     pub name: Option<String>,
-    /// "one twenty three", "b": what comes after the head.
-    pub number: Option<String>,
     /// "Nick's".
     pub owner: Option<Owner>,
     /// "double", "big", as said.
@@ -188,6 +190,8 @@ pub struct Features {
     pub other: bool,
     /// "The floor below" is −1.
     pub level: Option<i32>,
+    /// "Where we eat": what is done there.
+    pub purpose: Option<String>,
 }
 
 /// Whose a place is.
@@ -371,6 +375,11 @@ impl Phrase {
     /// The canonical full name, which is the map's label: "stata cafeteria", "lecture hall one twenty
     /// three", "nick's office"; none for pointers and mere descriptions.
     pub fn label(&self) -> Option<Name> {
+        self.full_name().filter(|name| name.kind() != Kind::Vague)
+    }
+
+    /// The name as [`label`](Self::label) has it, "the room" included.
+    pub(super) fn full_name(&self) -> Option<Name> {
         let Head::Named(head) = &self.head else { return None };
         let f = &self.features;
         let mut words = Vec::new();
@@ -380,7 +389,6 @@ impl Phrase {
         words.extend(f.name.clone());
         words.extend(f.qualities.iter().cloned());
         words.push(head.as_str().to_owned());
-        words.extend(f.number.clone());
         Name::new(&words.join(" "))
     }
 }

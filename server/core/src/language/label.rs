@@ -1,207 +1,206 @@
-//! "This is the gym": sentences that name the place held.
+//! "This is the gym", "we are back in the lobby": names given to places.
 
+use super::act::{Content, Head, Phrase, Sameness};
+use super::build::{Readings, label, locate_all, negate, one};
+use super::cursor::Cursor;
 use super::names::Kind;
-use super::noun_phrase::{Cursor, Determiner, NounPhrase};
+use super::noun_phrase::{Determiner, NounPhrase};
+use super::pointed::{pointed, related_predicate, same_place};
 
 /// The place held, as people point at it.
-const SPOT: &str = "this place|this room|this area|this space|this spot|this building";
+pub(super) const SPOT: &str = "this place here|this place|this room here|this room|this area|this space|this spot|this building|\
+    this location|this one here|this one";
+/// "As before": the place so called is one seen before.
+const AS_BEFORE: &str = "as before|as earlier|as last time|from before|from earlier|we saw before|we saw earlier|\
+    we were in before|we were in earlier|that we saw before|that we were in before|we have seen before|as we saw before|\
+    we visited before|we visited earlier|where we were before|where we were earlier|we passed before|we passed earlier|\
+    we came through before|we were at before|again|once again|once more";
+/// Says nothing of where the place is (a map is one level).
+const ON_FLOOR: &str = "of the building|of this building|in this building|in the building|to the building|to this building|\
+    on this floor|on our floor|on the ground floor|on the first floor|on the second floor|on the third floor|\
+    on the fourth floor|on the fifth floor|on the top floor";
 
-/// The phrase that names the place held, and whether the guide says "back" or "again".
-pub(super) fn label(at: &mut Cursor) -> Option<(NounPhrase, bool)> {
+/// Reads a clause that names a place pointed at, or says where it lies.
+pub(super) fn label_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
-    for form in [welcome, is_called, people_call] {
-        if let Some(phrase) = form(at) {
-            return Some((phrase, false));
+    for form in [welcome, people_call, presented_here, passed, pointed, we_are] {
+        if let Some(readings) = form(at) {
+            return Some(readings);
         }
         *at = start;
     }
-    if let Some(found) = this_is(at) {
-        return Some(found);
-    }
-    *at = start;
-    we_are_in(at)
+    None
 }
 
 /// "Welcome to the lab".
-fn welcome(at: &mut Cursor) -> Option<NounPhrase> {
-    at.eat_any("welcome to|welcome back to")?;
-    named(at).filter(|p| p.kind == Kind::Place)
+fn welcome(at: &mut Cursor) -> Option<Readings> {
+    let again = at.eat_any("welcome back to|welcome to")?.contains("back");
+    let phrase = named(at).filter(|p| p.kind == Kind::Place)?;
+    Some(called(at, Head::Here, phrase, again))
 }
 
-/// "This place is called Nirvana": a place's name, whatever it is; "this is called teamwork" is less
-/// clear.
-fn is_called(at: &mut Cursor) -> Option<NounPhrase> {
-    let place = at.eat_any(SPOT).is_some() || !at.eat("this");
-    at.eat_any("is called|is also called|is known as|is also known as|is named")?;
-    named(at).filter(|p| place || plausible(p))
-}
-
-/// "They call this place the Z-center".
-fn people_call(at: &mut Cursor) -> Option<NounPhrase> {
-    at.eat_any("we|they|people|everyone|everybody|the students|i")?;
-    at.skip("all|also|usually|just");
-    at.eat_any("call|calls")?;
-    let place = at.eat_any(SPOT).is_some();
-    if !(place || at.eat("this")) {
-        return None;
+/// "They call this place the Z-center", "we call it the fishbowl".
+fn people_call(at: &mut Cursor) -> Option<Readings> {
+    at.eat_any("we|they|people|everyone|everybody|the students|students|i|most people|some people|you can")?;
+    at.skip("all|also|usually|just|like to|always|sometimes|often|normally");
+    at.eat_any("call|calls|refer to")?;
+    let spot = at.eat_any(SPOT).is_some();
+    if spot || at.eat_any("this|these").is_some() {
+        at.eat("as");
+        let phrase = named(at).filter(|p| spot || plausible(p))?;
+        return Some(called(at, Head::Here, phrase, false));
     }
-    named(at).filter(|p| place || plausible(p))
+    let what = if at.eat_any("it|that").is_some() {
+        Phrase::new(Head::It)
+    } else {
+        let what =
+            at.noun_phrase().filter(|p| p.kind == Kind::Place && p.determiner != Determiner::Indefinite)?;
+        what.phrase
+    };
+    at.eat("as");
+    let also = named(at).filter(|p| what.head != Head::It || plausible(p))?;
+    Some(one(Content::Alias { what, also: also.phrase }))
 }
 
-/// "This is the gym", "here are the elevators".
-fn this_is(at: &mut Cursor) -> Option<(NounPhrase, bool)> {
+/// "Here we have the kitchen", "we have reached the lobby".
+fn presented_here(at: &mut Cursor) -> Option<Readings> {
     at.eat_any(
-        "this is|here is|here are|these are|this here is|here we have|here you have|over here we have|over here is|\
-        this place is|this room is|this area is|we have reached|we have entered|we have just entered|\
-        we just entered|we are entering|we are now entering|you are entering|you are now entering",
+        "over here we have|here we have|here you have|here you can see|here you see|here you will find|over here is|\
+         we have reached|we have now reached|we have entered|we have just entered|we just entered|we are entering|\
+         we are now entering|you are entering|you are now entering|we just reached|we have just reached|\
+         we just walked into|we have come to|we have arrived at|we have arrived in|you have reached|\
+         you have just entered|we have made it to|we are now coming into|we are coming into|\
+         what you see here is|what you are looking at is|what we have here is",
     )?;
-    let back = at.eat_any("again|once again").is_some();
-    at.skip("now");
-    named(at).filter(plausible).map(|p| (p, back))
+    let phrase = named(at).filter(plausible)?;
+    Some(called(at, Head::Here, phrase, false))
 }
 
-/// "We are back in the gym".
-fn we_are_in(at: &mut Cursor) -> Option<(NounPhrase, bool)> {
+/// "We just passed the library".
+fn passed(at: &mut Cursor) -> Option<Readings> {
+    at.eat_any(
+        "we have just passed|we just passed|we have just left|we just left|we just came from|we just came out of|\
+         we have just come from|we have just come out of|you just passed|you have just passed|we were just in|\
+         we just walked past|we just walked out of|we just exited",
+    )?;
+    let phrase = named(at).filter(plausible)?;
+    Some(called(at, Head::Previous, phrase, false))
+}
+
+/// "We are back in the gym", "we are next to the gym", "we have been here before".
+fn we_are(at: &mut Cursor) -> Option<Readings> {
+    if at.eat_any("we have been here before|we have been here already|we have already been here|we were here before|\
+        we were here earlier|we were here already|we were already here|i have been here before|you have been here before|\
+        we have seen this place before|we have seen this before|we have seen this room before|we have been in this room before|\
+        we have been in here before|we have visited this place before")
+        .is_some()
+    {
+        return Some(one(been_here(true)));
+    }
+    if at.eat_any("we have not been here before|we have never been here before|we have never been here|\
+        we have not been here yet|we have not been here|we were not here before|this is a new place|this is somewhere new|\
+        you have not been here before|you have never been here before|you have never been here")
+        .is_some()
+    {
+        return Some(one(been_here(false)));
+    }
     let who = at.eat_any(
-        "here we are|now we are|we are|you are|i am|we have arrived|we have now arrived|we have just arrived|\
-        we just arrived|you have arrived|we have come",
+        "here we are|now we are|and now we are|we are|you are|i am|we have arrived|we have now arrived|we have just arrived|\
+         we just arrived|you have arrived|we have come|we have just come|we might be|we may be|we could be|\
+         we must be|we seem to be",
     );
     // "Back at the lobby" does without.
     if who.is_none() && at.peek(0) != "back" {
         return None;
     }
-    let (mut back, mut inside) = (false, false);
+    let (mut back, mut inside, mut denied) = (false, false, false);
     loop {
         if at.eat_any("back|again|once again|still").is_some() {
             back = true;
-        } else if at.eat("inside") {
+        } else if at.eat_any("no longer|not").is_some() {
+            denied = true;
+        } else if at.eat_any("inside of|inside").is_some() {
             inside = true;
-        } else if at.eat_any("now|here|right|all|just|finally|currently|standing|already|at last").is_none() {
+        } else if at
+            .eat_any("now|here|right|all|just|finally|currently|standing|already|at last|probably|actually|really|definitely")
+            .is_none()
+        {
             break;
         }
     }
+    let start = *at;
+    let alone = who == Some("i am");
+    if let Some(same) = same_place(at, &Head::Here).filter(|_| !alone) {
+        return Some(one(if denied { negate(same) } else { same }));
+    }
+    *at = start;
+    let readings = inside_of(at, back, inside, who.is_some()).or_else(|| {
+        *at = start;
+        (!alone && !inside).then(|| related_predicate(at, Head::Here)).flatten()
+    })?;
+    Some(if denied { readings.map(negate) } else { readings })
+}
+
+fn been_here(same: bool) -> Content {
+    Content::Same { what: Phrase::new(Head::Here), like: Phrase::new(Head::Visited), same }
+}
+
+/// "In the gym", after "we are".
+fn inside_of(at: &mut Cursor, back: bool, inside: bool, said_who: bool) -> Option<Readings> {
     let on = at.eat("on");
-    if !(on || inside || at.eat_any("in|at|by").is_some() || (back && who.is_some() && at.eat("to"))) {
+    if !(on || inside || at.eat_any("in|at|by").is_some() || (back && said_who && at.eat("to"))) {
         return None;
     }
     // "On the terrace", but not "on the same page".
-    named(at).filter(|p| plausible(p) && (!on || p.kind == Kind::Place)).map(|p| (p, back))
+    let phrase = named(at).filter(|p| plausible(p) && (!on || p.kind == Kind::Place))?;
+    Some(called(at, Head::Here, phrase, back))
 }
 
-/// A noun phrase that may name the place held.
-fn named(at: &mut Cursor) -> Option<NounPhrase> {
-    at.noun_phrase().filter(|p| p.kind != Kind::No && p.determiner != Determiner::Demonstrative)
+/// A noun phrase that may name a place.
+pub(super) fn named(at: &mut Cursor) -> Option<NounPhrase> {
+    at.noun_phrase()
+        .filter(|p| matches!(p.kind, Kind::Place | Kind::Open) && p.determiner != Determiner::Demonstrative)
 }
 
 /// A known kind of place, or any definite single thing: unknown things ("a test", "the results") name
 /// no place.
-fn plausible(phrase: &NounPhrase) -> bool {
-    phrase.kind == Kind::Place || (phrase.determiner == Determiner::Definite && !phrase.plural)
+pub(super) fn plausible(phrase: &NounPhrase) -> bool {
+    phrase.kind == Kind::Place
+        || (phrase.kind == Kind::Open && phrase.determiner == Determiner::Definite && !phrase.is_plural())
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::parse;
-
-    fn label(text: &str) -> String {
-        parse(text).notation
-    }
-
-    #[test]
-    fn names_are_given_in_many_ways() {
-        for (text, name) in [
-            ("This is the kitchen.", "kitchen"),
-            ("this is a kitchen", "kitchen"),
-            ("Here’s the mail room", "mail_room"),
-            ("here are the drinking fountains", "drinking_fountain"),
-            ("We are at the back entrance.", "back_entrance"),
-            ("We're in the lobby now.", "lobby"),
-            ("So now you are in the main lobby, everyone", "main_lobby"),
-            ("I'm in the copy room", "copy_room"),
-            ("we are standing by the mural", "mural"),
-            ("we have arrived at the loading dock", "loading_dock"),
-            ("we're on the terrace", "terrace"),
-            ("welcome to the Stata Center", "stata_center"),
-            ("They call this place the Z-center.", "z_center"),
-            ("we call this room the fishbowl", "fishbowl"),
-            ("this place is called Nirvana", "nirvana"),
-            ("This is lecture hall one twenty three.", "lecture_hall_one_twenty_three"),
-            ("This is lecture hall 155", "lecture_hall_one_fifty_five"),
-            ("this is Nick's office", "nick's_office"),
-            ("this is our beautiful library", "library"),
-            ("this is the information desk", "information_desk"),
-            ("this is the kitchen, where we have lunch", "kitchen"),
-            ("this is the elevator lobby on the first floor", "elevator_lobby"),
-            ("we are at the entrance to the building", "entrance"),
-        ] {
-            assert_eq!(label(text), format!("label(here,{name})"), "{text}");
+/// The place is called `phrase`, with what comes after the name.
+pub(super) fn called(at: &mut Cursor, head: Head, phrase: NounPhrase, mut again: bool) -> Readings {
+    at.skip(ON_FLOOR);
+    let mut start = false;
+    while !at.at_end() {
+        let before = *at;
+        at.eat(",");
+        if at.eat_any(AS_BEFORE).is_some() {
+            again = true;
+        } else if at.pointer().is_some_and(|p| p.head == Head::Start) {
+            start = true;
+        } else {
+            *at = before;
+            break;
         }
     }
-
-    #[test]
-    fn sameness_is_heard() {
-        for text in [
-            "We're back in the lobby",
-            "back at the lobby",
-            "we have come back to the lobby",
-            "this is the lobby again",
-            "once again this is the lobby",
-            "we are in the lobby once more",
-            "this is the same lobby",
-        ] {
-            assert_eq!(label(text), "label(here,lobby)&same(here,lobby)", "{text}");
-        }
-        for text in ["This is another lobby.", "this is a different lobby", "we are in the other lobby now"] {
-            assert_eq!(label(text), "label(here,lobby)&other(here,lobby)", "{text}");
-        }
+    let sameness = if again && phrase.sameness == Sameness::Open { Sameness::Same } else { phrase.sameness };
+    if start {
+        let same =
+            Content::Same { what: Phrase::new(head.clone()), like: Phrase::new(Head::Start), same: true };
+        return Readings::new(vec![(1.0, vec![label(head, phrase.phrase, Sameness::Open), same])]);
     }
-
-    #[test]
-    fn what_names_no_place_asserts_nothing() {
-        for text in [
-            "this is great",
-            "this is my friend John",
-            "this is John",
-            "this is the famous Mister Jones",
-            "this is Anna's sister",
-            "we are in trouble",
-            "we're in luck",
-            "we are at war",
-            "we are in the middle of the hallway",
-            "we're in the clear",
-            "I'm in the mood for coffee",
-            "I'm in bed",
-            "you are in charge",
-            "here is the plan",
-            "here's the thing",
-            "here we go",
-            "here we are",
-            "here are some cookies",
-            "this is the best",
-            "this is the first time",
-            "this is the end of the tour",
-            "this is the weather forecast",
-            "this is the kitchen table",
-            "this is a test",
-            "this is the wrong room",
-            "this is a large room",
-            "this is the next room",
-            "this is the second floor",
-            "this is the robot",
-            "this is near the kitchen",
-            "this is what I wanted",
-            "this is one of the kitchens",
-            "that is the kitchen",
-            "welcome to the team",
-            "welcome to the jungle",
-            "they call me Bob",
-            "we call this progress",
-            "this is called teamwork",
-            "we're on the same page",
-            "we just left the kitchen",
-            "you are in front of the stairs",
-        ] {
-            assert_eq!(label(text), "none", "{text}");
-        }
+    let chain = at.chain(true);
+    let mine = |h: &Head| matches!(h, Head::Agent | Head::Speaker | Head::Path);
+    if head == Head::Here && chain.first().is_some_and(|r| r.landmarks.iter().any(|l| mine(&l.head))) {
+        // "Here is the kitchen on your left" locates it.
+        return locate_all(&[vec![(1.0, phrase.phrase)]], &chain.attach());
     }
+    let all = chain
+        .restrict(&phrase.phrase)
+        .into_iter()
+        .map(|(w, what)| (w, vec![label(head.clone(), what, sameness)]))
+        .collect();
+    Readings::new(all)
 }

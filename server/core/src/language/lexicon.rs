@@ -1,84 +1,62 @@
 //! What words are: a name is plausible as a place if its head noun is known, or if it is definite
 //! ("the mural") and nothing speaks against it: the vocabulary stays open.
 
+use super::concepts::{CONCEPTS, SPOKEN, Type};
 use super::word_lists::{
-    COMPOUNDS, FUNCTION_WORDS, GENERIC, KEEP_S, LY_NOUNS, NOT_PLACES, PLACES, PRAISE, WEAK,
+    COMPOUNDS, FUNCTION_WORDS, GENERIC, KEEP_S, LY_NOUNS, NOT_PLACES, PLACES, PRAISE, QUALITIES, WEAK,
 };
-
-/// Spellings and words that mean the same wherever they stand in a name.
-const SAME_WORD: &[(&str, &str)] = &[
-    ("lift", "elevator"),
-    ("restroom", "bathroom"),
-    ("washroom", "bathroom"),
-    ("toilet", "bathroom"),
-    ("lavatory", "bathroom"),
-    ("loo", "bathroom"),
-    ("wc", "bathroom"),
-    ("corridor", "hallway"),
-    ("passageway", "hallway"),
-    ("hallways", "hallway"),
-    ("stair", "stairs"),
-    ("staircase", "stairs"),
-    ("stairway", "stairs"),
-    ("stairwell", "stairs"),
-    ("theatre", "theater"),
-    ("centre", "center"),
-    ("gymnasium", "gym"),
-    ("laboratory", "lab"),
-    ("canteen", "cafeteria"),
-    ("photocopier", "copier"),
-    ("info", "information"),
-    ("entryway", "entrance"),
-    ("bike", "bicycle"),
-    ("tv", "television"),
-    ("rec", "recreation"),
-    ("mens", "men's"),
-    ("womens", "women's"),
-    ("childrens", "children's"),
-    ("parlour", "parlor"),
-];
-
-/// Pairs of words that mean or spell the same as others.
-const SAME_PAIR: &[(&str, &str, &[&str])] = &[
-    ("water", "fountain", &["drinking", "fountain"]),
-    ("bath", "room", &["bathroom"]),
-    ("bed", "room", &["bedroom"]),
-    ("class", "room", &["classroom"]),
-    ("wash", "room", &["bathroom"]),
-    ("rest", "room", &["bathroom"]),
-    ("hall", "way", &["hallway"]),
-    ("stair", "case", &["stairs"]),
-    ("stair", "well", &["stairs"]),
-    ("car", "park", &["parking", "lot"]),
-    ("door", "way", &["doorway"]),
-    ("copy", "machine", &["copier"]),
-];
-
-/// Words written together by some and apart by others: apart it is.
-const APART: &[(&str, [&str; 2])] = &[
-    ("mailroom", ["mail", "room"]),
-    ("lunchroom", ["lunch", "room"]),
-    ("storeroom", ["storage", "room"]),
-    ("boardroom", ["board", "room"]),
-    ("workroom", ["work", "room"]),
-    ("playroom", ["play", "room"]),
-    ("carpark", ["parking", "lot"]),
-    ("darkroom", ["dark", "room"]),
-];
 
 fn listed(list: &[&str], word: &str) -> bool {
     list.binary_search(&word).is_ok()
 }
 
+/// What a concept is, if it is one of the lexicon's.
+pub(super) fn concept(name: &str) -> Option<Type> {
+    CONCEPTS.binary_search_by(|(lemma, ..)| (*lemma).cmp(name)).ok().map(|i| CONCEPTS[i].1)
+}
+
+/// The kind of a concept: an elevator lobby is a lobby.
+pub(super) fn hypernym(name: &str) -> Option<&'static str> {
+    CONCEPTS.binary_search_by(|(lemma, ..)| (*lemma).cmp(name)).ok().map(|i| CONCEPTS[i].2)
+}
+
+fn names_place(name: &str) -> bool {
+    concept(name).is_some_and(|t| !matches!(t, Type::Thing | Type::Region))
+}
+
+/// All known places of one word.
+pub(super) fn places() -> impl Iterator<Item = &'static str> {
+    let concepts = CONCEPTS.iter().map(|(lemma, ..)| *lemma).filter(|l| names_place(l) && !l.contains(' '));
+    concepts.chain(PLACES.iter().copied())
+}
+
 /// Does this noun name a place by itself ("lobby")?
 pub(super) fn is_place(word: &str) -> bool {
-    listed(PLACES, word)
+    listed(PLACES, word) || (names_place(word) && !is_generic(word))
 }
 
 /// Do these two words name a spot together ("information desk")?
 pub(super) fn is_compound(first: &str, second: &str) -> bool {
     let pair = format!("{first} {second}");
-    listed(COMPOUNDS, &pair)
+    listed(COMPOUNDS, &pair) || names_place(&pair)
+}
+
+/// Is it a thing that tells where a place is ("the whiteboard") but no place itself?
+pub(super) fn is_thing(word: &str) -> bool {
+    concept(word) == Some(Type::Thing)
+}
+
+/// Is it an adjective that describes rather than names ("double", "big")?
+pub(super) fn is_quality(word: &str) -> bool {
+    listed(QUALITIES, word)
+}
+
+/// Is it something one goes along?
+pub(super) fn is_way(word: &str) -> bool {
+    matches!(
+        word,
+        "hallway" | "passage" | "aisle" | "walkway" | "tunnel" | "bridge" | "ramp" | "stairs" | "street"
+    )
 }
 
 /// Does this noun need a telling modifier ("mail area")?
@@ -123,19 +101,9 @@ fn is_adverb(word: &str) -> bool {
     word.len() > 4 && word.ends_with("ly") && !listed(LY_NOUNS, word)
 }
 
-/// The one word used for all that mean the same as `word`.
-pub(super) fn same_word(word: &str) -> &str {
-    SAME_WORD.iter().find(|(from, _)| *from == word).map_or(word, |(_, to)| to)
-}
-
-/// What two neighbouring words become, if they are spelled or said otherwise too.
-pub(super) fn same_pair(first: &str, second: &str) -> Option<&'static [&'static str]> {
-    SAME_PAIR.iter().find(|(a, b, _)| *a == first && *b == second).map(|(_, _, to)| *to)
-}
-
-/// A compound written together, taken apart.
-pub(super) fn apart(word: &str) -> Option<&'static [&'static str]> {
-    APART.iter().find(|(from, _)| *from == word).map(|(_, to)| to.as_slice())
+/// What a word, or two with a space between, is called in names, if it is said otherwise too.
+pub(super) fn unified(said: &str) -> Option<&'static str> {
+    SPOKEN.binary_search_by(|(form, _)| (*form).cmp(said)).ok().map(|i| SPOKEN[i].1)
 }
 
 /// The singular of a head noun. Taught and asked names both pass here, so that they meet.
@@ -159,10 +127,27 @@ mod tests {
 
     #[test]
     fn lists_are_sorted_and_without_doubles() {
-        for list in [PLACES, COMPOUNDS, GENERIC, WEAK, PRAISE, NOT_PLACES, FUNCTION_WORDS, KEEP_S, LY_NOUNS] {
+        for list in [
+            PLACES,
+            COMPOUNDS,
+            GENERIC,
+            WEAK,
+            PRAISE,
+            NOT_PLACES,
+            FUNCTION_WORDS,
+            KEEP_S,
+            LY_NOUNS,
+            QUALITIES,
+        ] {
             for pair in list.windows(2) {
                 assert!(pair[0] < pair[1], "{pair:?}");
             }
+        }
+        for pair in CONCEPTS.windows(2) {
+            assert!(pair[0].0 < pair[1].0, "{pair:?}");
+        }
+        for pair in SPOKEN.windows(2) {
+            assert!(pair[0].0 < pair[1].0, "{pair:?}");
         }
     }
 

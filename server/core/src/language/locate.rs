@@ -1,182 +1,365 @@
-//! "The gym is down the hall": a figure, one of the four relations, a landmark.
+//! "The gym is down the hall", "on your left you'll see the lab": a figure and where it lies; and what
+//! else is said of a place by name.
 
+use super::act::{Content, Head, Owner, Phrase, Sameness};
+use super::attach::{Chain, Weighed};
+use super::build::{Readings, label, locate_all, negate, one, shaped};
+use super::copula::Copula;
+use super::cursor::Cursor;
+use super::describe::attribute;
+use super::label::{named, plausible};
 use super::names::Kind;
-use super::noun_phrase::{Cursor, Determiner, NounPhrase};
-use super::{Act, Landmark, Relation};
+use super::noun_phrase::{Determiner, NounPhrase};
+use super::pointed::where_kept;
+use super::relate::Related;
+use super::relation::Relation as R;
+use super::repair::{guessed, mended};
 
 /// Figures of one clause ("the kitchen and the lounge are …").
 const MAX_FIGURES: usize = 4;
 /// Shows something that the listener need not know.
-const PRESENT: &str = "there is also|there is|there are|we have|you have|you will find|you can find|you find|\
-    you will see|you can see|we find";
-const FOUND: &str = "can be found|is|are";
+const PRESENT: &str = "there is also|there are also|there is|there are|there will be|there should be|there used to be|\
+    we also have|we have got|we have|you have got|you have|you will find|you can find|you find|you will see|you can see|\
+    you see|we find|you will come to|you will be able to see|you should see|you should find|we will find|we will see|\
+    you will also find|you can also find|you will also see|you will pass|we have also got";
 
-/// The acts of one clause, one per figure; none if it is no such clause.
-pub(super) fn locate(at: &mut Cursor) -> Option<Vec<Act>> {
+/// Reads a clause that locates something.
+pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
-    if at.eat_any(PRESENT).is_some() {
-        let figure = figure(at, true)?;
-        return located(vec![figure], &ground(at)?);
-    }
-    if let Some(ground) = ground(at) {
-        at.skip(",");
-        at.eat_any(FOUND).or_else(|| at.eat_any(PRESENT))?;
-        return located(vec![figure(at, true)?], &ground);
-    }
-    *at = start;
-    let mut figures = vec![figure(at, false)?];
-    while figures.len() < MAX_FIGURES && at.eat("and") {
-        figures.push(figure(at, false)?);
-    }
-    at.eat_any(FOUND)?;
-    located(figures, &ground(at)?)
-}
-
-/// What a clause may locate: no pronoun, no bare plural ("kitchens are near lounges" is generic), no
-/// door, and an indefinite one only where the sentence presents it ("there is a lab …").
-fn figure(at: &mut Cursor, presented: bool) -> Option<NounPhrase> {
-    let phrase = at.noun_phrase()?;
-    let fits = match phrase.determiner {
-        Determiner::Definite => phrase.kind != Kind::No,
-        Determiner::Indefinite => phrase.kind == Kind::Place && presented,
-        Determiner::None => phrase.kind == Kind::Place && (presented || !phrase.plural),
-        Determiner::Possessive => phrase.kind == Kind::Place,
-        Determiner::Demonstrative => false,
-    };
-    let door = ["door", "doorway"].iter().any(|d| phrase.name.as_str().ends_with(d));
-    (fits && !door).then_some(phrase)
-}
-
-/// What a figure is located by.
-struct Ground {
-    relation: Relation,
-    landmark: Landmark,
-    /// The landmark is surely a place.
-    known_kind: bool,
-}
-
-fn ground(at: &mut Cursor) -> Option<Ground> {
-    const RELATIONS: [(&str, Relation); 4] = [
-        ("through", Relation::Through),
-        ("down|along", Relation::Down),
-        ("far away from|away from|far from", Relation::AwayFrom),
-        ("next door to|near to|near|close to|next to|beside|by|adjacent to|around", Relation::Near),
-    ];
-    at.skip("both|all|located|situated|just|right|directly|back|also|over|very");
-    let relation = RELATIONS.iter().find(|(phrases, _)| at.eat_any(phrases).is_some()).map(|(_, r)| *r);
-    let Some(relation) = relation else {
-        return at.eat("next door").then_some(Ground {
-            relation: Relation::Near,
-            landmark: Landmark::Here,
-            known_kind: false,
-        });
-    };
-    if at.eat_any("here|this place|this spot").is_some() {
-        // One is near or away from here; "down here" says nothing of the kind.
-        let metric = matches!(relation, Relation::Near | Relation::AwayFrom);
-        return metric.then_some(Ground { relation, landmark: Landmark::Here, known_kind: false });
-    }
-    let phrase = at.noun_phrase().filter(|p| p.kind != Kind::No)?;
-    // "Through the roof" is said of prices, not of rooms.
-    let idiom = relation == Relation::Through && phrase.name.as_str() == "roof";
-    let bare_plural = phrase.plural && phrase.determiner == Determiner::None;
-    let known_kind = phrase.kind == Kind::Place;
-    if idiom || bare_plural || !(known_kind || phrase.determiner == Determiner::Definite) {
-        return None;
-    }
-    skip_side(at);
-    Some(Ground { relation, landmark: Landmark::Name(phrase.name), known_kind })
-}
-
-/// "… on your left": the relation before it stands without.
-fn skip_side(at: &mut Cursor) {
-    let start = *at;
-    at.skip(",");
-    let side = at.eat_any("on|to").is_some()
-        && at.eat_any("the|your|our").is_some()
-        && at.eat_any("left|right").is_some();
-    if side {
-        at.skip("hand side|side");
-    } else {
+    for form in [wanted, presented, inverted, said_of_places] {
+        if let Some(readings) = form(at) {
+            return Some(readings);
+        }
         *at = start;
     }
+    None
 }
 
-/// The acts, if the figures or the landmark surely are places.
-fn located(figures: Vec<NounPhrase>, ground: &Ground) -> Option<Vec<Act>> {
-    let sure = ground.known_kind || figures.iter().all(|f| f.kind == Kind::Place);
-    let itself = figures.iter().any(|f| ground.landmark == Landmark::Name(f.name.clone()));
-    let act = |f: NounPhrase| Act::Locate {
-        figure: f.name,
-        relation: ground.relation,
-        landmark: ground.landmark.clone(),
+/// "If you are looking for the library, it's down the hall".
+fn wanted(at: &mut Cursor) -> Option<Readings> {
+    at.eat_any(
+        "if you are looking for|if you need|if you want|if you are going to|if you have to go to|for",
+    )?;
+    let figures = figures(at, true)?;
+    at.skip(",|then");
+    at.eat_any("it is|they are|that is|you can find it|you will find it|you can find them")?;
+    located(&figures, &at.chain(false))
+}
+
+/// "There is a lab next to the gym", "you can find the copier in the mail room".
+fn presented(at: &mut Cursor) -> Option<Readings> {
+    let verb = at.eat_any(PRESENT)?;
+    at.skip("actually|also|probably|even|only|just");
+    let none = at.eat_any("no|not a|not any|no other").is_some();
+    let figures = figures(at, true)?;
+    let chain = at.chain(false);
+    // "You have a kitchen" says nothing; "there is a room" neither.
+    let readings = located(&figures, &chain)?;
+    let denies = none ^ (verb == "there used to be");
+    Some(if denies { readings.map(negate) } else { readings })
+}
+
+/// "Just past the entrance is the reception desk".
+fn inverted(at: &mut Cursor) -> Option<Readings> {
+    at.skip("here|over here|up here|down here");
+    let chain = at.leading_chain();
+    chain.first()?;
+    at.skip(",");
+    let verb = if at.eat_any(PRESENT).is_some() { None } else { Some(at.copula()?) };
+    let figures = figures(at, true)?;
+    let readings = located(&figures, &chain)?;
+    Some(match verb {
+        Some(verb) => shaped(readings, &verb),
+        None => readings,
+    })
+}
+
+/// "The kitchen and the lounge are down the hall", "the last office on the left is Nick's".
+fn said_of_places(at: &mut Cursor) -> Option<Readings> {
+    let (subjects, told) = subjects(at)?;
+    let start = *at;
+    if let [subject] = subjects.as_slice()
+        && let Some(readings) = leads(at, subject)
+    {
+        return Some(readings);
+    }
+    *at = start;
+    if let ([subject], [readings]) = (subjects.as_slice(), told.as_slice())
+        && at.eat_any("belongs to|belong to").is_some()
+    {
+        return belongs(at, subject, readings);
+    }
+    *at = start;
+    let verb = at.copula()?;
+    if verb.quantity.is_some() {
+        return None;
+    }
+    let readings = predicate(at, &subjects, &told, &verb)?;
+    Some(shaped(readings, &verb))
+}
+
+/// The subjects with what tells them, each with its readings.
+fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> {
+    let mut plain = Vec::new();
+    let mut told = Vec::new();
+    at.skip("both");
+    loop {
+        let mut subject = at.noun_phrase()?;
+        let relative = at.eat_any(", which is|, which are|, located|, situated").is_some();
+        let chain = at.chain(true);
+        if relative && (chain.is_empty() || at.at_end()) {
+            return None;
+        }
+        at.skip(",");
+        let readings = chain.restrict(&subject.phrase);
+        subject.phrase = readings.first().map_or(subject.phrase, |(_, p)| p.clone());
+        plain.push(subject);
+        told.push(readings);
+        let more = at.eat_any("and also|as well as|and").is_some() || (at.before() == "," && at.lists());
+        if plain.len() >= MAX_FIGURES || !more {
+            return Some((plain, told));
+        }
+    }
+}
+
+/// What is said of named places.
+fn predicate(
+    at: &mut Cursor,
+    subjects: &[NounPhrase],
+    told: &[Weighed<Phrase>],
+    verb: &Copula,
+) -> Option<Readings> {
+    let start = *at;
+    let chain = at.chain(false);
+    if !chain.is_empty() && !verb.past {
+        if subjects.iter().all(|s| fits(s, false)) {
+            return located_told(subjects, told, &chain);
+        }
+        let [subject] = subjects else { return None };
+        let plain =
+            subject.kind == Kind::No && subject.determiner == Determiner::Definite && !subject.is_told();
+        let figure = mended(&subject.phrase).filter(|_| plain && chain.sure())?;
+        let meant = NounPhrase { phrase: figure, kind: Kind::Place, ..subject.clone() };
+        return located(&[meant], &chain).and_then(guessed);
+    }
+    *at = start;
+    if at.eat_any("right here|here").is_some() && (at.at_break() || at.sees("and|but")) {
+        // "The kitchen is here" names the place held.
+        let fit = subjects.iter().all(|s| fits(s, false) && s.determiner != Determiner::None);
+        let here = |s: &NounPhrase| label(Head::Here, s.phrase.clone(), Sameness::Open);
+        return fit.then(|| Readings::new(vec![(1.0, subjects.iter().map(here).collect())]));
+    }
+    *at = start;
+    let ([subject], [readings]) = (subjects, told) else { return None };
+    if !matches!(subject.kind, Kind::Place | Kind::Vague | Kind::Open)
+        || subject.determiner == Determiner::Indefinite
+        || (subject.kind != Kind::Place && !subject.is_told() && !subject.phrase.features.this)
+    {
+        return None;
+    }
+    let made = |make: &dyn Fn(Phrase) -> Vec<Content>| -> Option<Readings> {
+        Some(Readings::new(readings.iter().map(|(w, p)| (*w, make(p.clone()))).collect()))
     };
-    (sure && !itself).then(|| figures.into_iter().map(act).collect())
+    if at
+        .eat_any(
+            "also called|also known as|also named|called|known as|named|referred to as|known to everyone as",
+        )
+        .is_some()
+    {
+        let also = named(at)?.phrase;
+        return made(&|what| vec![Content::Alias { what, also: also.clone() }]);
+    }
+    if let Some(owner) = at.owner_alone() {
+        return made(&|what| vec![Content::Alias { also: owned(&what, &owner), what }]);
+    }
+    *at = start;
+    if let Some(like) = at.pointer().filter(|p| matches!(p.head, Head::Start | Head::Previous)) {
+        return made(&|what| vec![Content::Same { what, like: like.clone(), same: true }]);
+    }
+    *at = start;
+    if let Some(also) = where_kept(at) {
+        return made(&|what| vec![Content::Alias { what, also: also.clone() }]);
+    }
+    *at = start;
+    if at
+        .eat_any("the same place as|the same room as|the same as|the same thing as|the same one as")
+        .is_some()
+    {
+        let (like, _) = at.landmark()?;
+        return made(&|what| vec![Content::Same { what, like: like.clone(), same: true }]);
+    }
+    if let Some(value) = attribute(at).filter(|_| at.at_break() || at.sees("and|but")) {
+        let door = !subject.is_told() && is_door(&subject.phrase);
+        return if door {
+            None
+        } else {
+            made(&|what| vec![Content::Attribute { what, value: value.clone() }])
+        };
+    }
+    *at = start;
+    identified(at, subject, readings, verb)
 }
 
-#[cfg(test)]
-mod tests {
-    use super::super::parse;
+/// "The last office on the left is the lab", "the lab is the second door on the right", "the lobby is
+/// really the atrium".
+fn identified(
+    at: &mut Cursor,
+    subject: &NounPhrase,
+    readings: &Weighed<Phrase>,
+    verb: &Copula,
+) -> Option<Readings> {
+    let other = at
+        .noun_phrase()
+        .filter(|p| p.determiner != Determiner::Demonstrative && !matches!(p.kind, Kind::No | Kind::Thing))?;
+    let chain = at.chain(true);
+    let pairs = |make: &dyn Fn(&Phrase, &Phrase) -> Vec<Content>| {
+        let others = chain.restrict(&other.phrase);
+        let all = readings
+            .iter()
+            .flat_map(|(w, a)| others.iter().map(move |(v, b)| (w * v, a, b)))
+            .map(|(w, a, b)| (w, make(a, b)))
+            .collect();
+        Some(Readings::new(all))
+    };
+    let at_place = |figure: &Phrase, place: &Phrase| {
+        vec![super::build::locate(figure, &Related::to(R::At, place.clone()))]
+    };
+    let tells = !chain.is_empty() || other.phrase.features.ordinal.is_some();
+    if tells && (other.kind == Kind::Vague || is_door(&other.phrase)) && subject.kind == Kind::Place {
+        return pairs(&at_place);
+    }
+    let names = other.kind == Kind::Place || (other.kind == Kind::Open && plausible(&other));
+    if !names || other.determiner == Determiner::Indefinite {
+        return None;
+    }
+    if subject.is_told() && is_door(&subject.phrase) {
+        return pairs(&|door, figure| at_place(figure, door));
+    }
+    if subject.is_told() {
+        return pairs(&|what, also| vec![Content::Alias { what: what.clone(), also: also.clone() }]);
+    }
+    if !verb.corrects {
+        return None;
+    }
+    pairs(&|was, is| renamed(was.clone(), is.clone()))
+}
 
-    #[test]
-    fn the_four_relations_are_understood() {
-        for (text, notation) in [
-            ("The gym is down the hallway.", "loc(gym,down,hallway)"),
-            ("The gym's down the hall", "loc(gym,down,hallway)"),
-            ("the mural is along the corridor", "loc(mural,down,hallway)"),
-            ("The children's center is through the hallway.", "loc(children's_center,through,hallway)"),
-            ("the lab is through the double doors on your left", "loc(lab,through,double_door)"),
-            ("The library is near the cafe.", "loc(library,near,cafe)"),
-            ("the library is located right next to the cafe", "loc(library,near,cafe)"),
-            ("our lab is close to the stairs", "loc(lab,near,stairs)"),
-            ("the information desk is by the main entrance", "loc(information_desk,near,main_entrance)"),
-            ("the lounge is away from the hallway", "loc(lounge,away_from,hallway)"),
-            ("the cafe is far from here", "loc(cafe,away_from,here)"),
-            ("the kitchen is near here", "loc(kitchen,near,here)"),
-            ("there's a kitchen nearby", "loc(kitchen,near,here)"),
-            ("the lounge is next door", "loc(lounge,near,here)"),
-            ("lecture hall 123 is down this hallway", "loc(lecture_hall_one_twenty_three,down,hallway)"),
-            ("down the hall is the gym", "loc(gym,down,hallway)"),
-            ("Near the elevators, you'll find a vending machine.", "loc(vending_machine,near,elevator)"),
-            ("you can find the copier next to the mail room", "loc(copier,near,mail_room)"),
-            ("there are restrooms near the stairs", "loc(bathroom,near,stairs)"),
-            (
-                "The kitchen and the lounge are both down this hallway.",
-                "loc(kitchen,down,hallway)&loc(lounge,down,hallway)",
-            ),
-        ] {
-            assert_eq!(parse(text).notation, notation, "{text}");
+/// The name `was` was wrong for what is `is`.
+pub(super) fn renamed(was: Phrase, is: Phrase) -> Vec<Content> {
+    let any = |what: &Phrase| Box::new(label(Head::Any, what.clone(), Sameness::Open));
+    vec![Content::Correct { was: Some(any(&was)), is: any(&is) }, Content::Alias { what: was, also: is }]
+}
+
+fn owned(what: &Phrase, owner: &Owner) -> Phrase {
+    let mut owned = Phrase::new(what.head.clone());
+    owned.features.owner = Some(owner.clone());
+    owned
+}
+
+/// "The office by the window belongs to Anna".
+fn belongs(at: &mut Cursor, subject: &NounPhrase, readings: &Weighed<Phrase>) -> Option<Readings> {
+    let owner = if at.eat("me") { Owner::Speaker } else { Owner::Named(at.person()?) };
+    let place = subject.kind == Kind::Place || (subject.kind == Kind::Vague && subject.is_told());
+    let all =
+        readings.iter().map(|(w, p)| (*w, vec![Content::Alias { also: owned(p, &owner), what: p.clone() }]));
+    place.then(|| Readings::new(all.collect()))
+}
+
+/// "This hallway leads to the gym".
+fn leads(at: &mut Cursor, subject: &NounPhrase) -> Option<Readings> {
+    let definite = matches!(subject.determiner, Determiner::Definite | Determiner::Demonstrative);
+    let way = matches!(subject.kind, Kind::Place | Kind::Vague) && definite;
+    at.skip("also|then");
+    let relation = match at.eat_any(
+        "leads back to|leads into|leads to|leads down to|leads up to|lead to|goes to|goes into|takes you to|\
+         brings you to|opens into|opens onto|opens to|runs past|goes past|leads past|runs along",
+    )? {
+        "runs past" | "goes past" | "leads past" => R::Past,
+        "runs along" => R::Along,
+        _ => R::To,
+    };
+    let (landmark, sure) = at.landmark()?;
+    (way && sure).then(|| one(super::build::locate(&subject.phrase, &Related::to(relation, landmark))))
+}
+
+pub(super) fn is_door(phrase: &Phrase) -> bool {
+    let Head::Named(name) = &phrase.head else { return phrase.head == Head::Place };
+    ["door", "doorway", "opening"].iter().any(|d| name.as_str().ends_with(d))
+}
+
+/// The figures of a clause, without what follows them.
+fn figures(at: &mut Cursor, presented: bool) -> Option<Vec<NounPhrase>> {
+    let mut all = vec![at.noun_phrase()?];
+    while all.len() < MAX_FIGURES {
+        let start = *at;
+        let more = at.eat_any("and also|and|, and").and_then(|_| at.noun_phrase());
+        match more.filter(|m| fits(m, presented)) {
+            Some(more) if !at.sees("is|are") => all.push(more),
+            _ => {
+                *at = start;
+                break;
+            }
         }
     }
+    all.iter().all(|f| fits(f, presented)).then_some(all)
+}
 
-    #[test]
-    fn other_relations_and_other_things_are_not() {
-        for text in [
-            "the restroom is past the stairs",
-            "the kitchen is on your left",
-            "the lab is about twenty meters down this hallway",
-            "the lounge is upstairs",
-            "it is down the hall",
-            "he is near the kitchen",
-            "kitchens are near lounges",
-            "kitchens are usually near lounges",
-            "the end is near",
-            "the end is near here",
-            "the kitchen is down",
-            "the sun is down",
-            "the kitten is down the hall",
-            "the chair is next to the table",
-            "this window is next to the bed",
-            "the door is next to the bathroom",
-            "the man is next to the elevator",
-            "sales are through the roof",
-            "the truth is far from here",
-            "the party is next door",
-            "the gym is down here",
-            "the gym is near the gym",
-            "he is down in the dumps past the point of caring",
-        ] {
-            assert_eq!(parse(text).notation, "none", "{text}");
+/// What a clause may locate: no door unless it is told from others, and an indefinite one only where the
+/// sentence presents it ("there is a lab …").
+fn fits(phrase: &NounPhrase, presented: bool) -> bool {
+    let known = phrase.kind == Kind::Place;
+    let fits = match phrase.determiner {
+        Determiner::Definite => {
+            known || phrase.kind == Kind::Open || (phrase.kind == Kind::Vague && phrase.is_told())
         }
+        Determiner::Indefinite => known && presented,
+        Determiner::None | Determiner::Possessive | Determiner::Demonstrative => known,
+    };
+    let told = phrase.is_told() && !presented;
+    fits && (told || !is_door(&phrase.phrase))
+}
+
+/// The figures where the chain says, if either surely are places.
+pub(super) fn located(figures: &[NounPhrase], chain: &Chain) -> Option<Readings> {
+    let plain: Vec<Weighed<Phrase>> = figures.iter().map(|f| vec![(1.0, f.phrase.clone())]).collect();
+    located_told(figures, &plain, chain)
+}
+
+fn located_told(figures: &[NounPhrase], told: &[Weighed<Phrase>], chain: &Chain) -> Option<Readings> {
+    let first = chain.first()?;
+    let sure = chain.sure() || figures.iter().all(|f| matches!(f.kind, Kind::Place));
+    let landmarks = || chain.landmarks();
+    let itself = figures.iter().any(|f| f.name().is_some() && landmarks().any(|l| *l == f.phrase));
+    // "Kitchens are near lounges" is said of kinds.
+    let kinds = figures.iter().any(|f| f.determiner == Determiner::None && f.is_plural())
+        && !landmarks()
+            .all(|l| matches!(l.head, Head::Here | Head::Path | Head::Agent | Head::There) || chain.definite);
+    // "Through the roof" is said of prices.
+    let roof =
+        first.relation == R::Through && landmarks().any(|l| l.label().is_some_and(|n| n.as_str() == "roof"));
+    let pointless = first.relation == R::To;
+    (sure && !itself && !kinds && !roof && !pointless).then(|| locate_all(told, &chain.attach()))
+}
+
+/// After a clause, ", which is next to the gym", ", also known as the galley": more of what it named.
+pub(super) fn said_further(at: &mut Cursor, first: &Content) -> Option<Readings> {
+    let phrase = match first {
+        Content::Label { what, .. } => what.clone(),
+        Content::Locate(locate) => locate.figure.clone(),
+        _ => return None,
+    };
+    let subject = NounPhrase {
+        determiner: Determiner::Definite,
+        sameness: Sameness::Open,
+        kind: Kind::Place,
+        phrase: phrase.clone(),
+    };
+    let told = [vec![(1.0, phrase.clone())]];
+    if at.eat_any("we call it|people call it|everyone calls it|some people call it|they call it|we also call|people call|we call|everybody calls it").is_some() {
+        let also = named(at)?.phrase;
+        return Some(one(Content::Alias { what: phrase, also }));
     }
+    let aka = at.sees("called|known as|also known as|also called");
+    let verb = if aka { super::copula::PLAIN } else { at.copula()? };
+    Some(shaped(predicate(at, &[subject], &told, &verb)?, &verb))
 }

@@ -1,90 +1,55 @@
-//! Language, first cut: what a guide's sentence says, and where it puts it (paper III-E).
+//! Language: what a guide's sentence says, and where it puts it (paper III-E).
 //!
-//! [`parse`] turns a text into acts: names given to the place held, one of the four relations
-//! between a figure and a landmark, questions. [`ground`] turns a relation into a probability for
-//! every place, eqs. (14–16). What is not understood yields no act, and [`words`] says so.
+//! [`parse`] turns a text into weighed analyses ([`act`]): names given to places, places located, other
+//! names, denials, corrections, questions; directions and general statements are recognised and set
+//! aside. [`ground`] turns a relation into a probability for every place, eqs. (14–16). What is not
+//! understood yields no act, and [`words`] says so.
 //!
-//! Deliberately absent here: negation, correction, hedges, routes, generic statements, other
-//! relations. A sentence that holds any of them is not understood rather than half understood.
+//! ```text
+//! text ─ normalise ─▶ words ─ parse (label, locate, ask, correct, generic, route) ─▶ readings of clauses
+//!                               │ cursor, noun_phrase, pointer, relate, level, copula
+//!                               └ attach: readings of "the office near the lounge by the stairs"
+//! readings ─ build, parse ─▶ analyses ─ notation, words ─▶ writing
+//! ```
 
 pub mod act;
+mod aside;
+mod ask;
+mod attach;
+mod build;
+mod concepts;
+mod copula;
+mod correct;
+mod cursor;
+mod describe;
+mod generic;
 mod ground;
 mod label;
+mod level;
 mod lexicon;
 mod locate;
 mod names;
 mod normalise;
+mod notation;
 mod noun_phrase;
 mod numbers;
 mod parse;
+mod pointed;
+mod pointer;
+mod relate;
 mod relation;
-mod typed;
+mod repair;
+mod route;
+mod sentence;
+#[cfg(test)]
+mod tests;
 mod word_lists;
 mod words;
 
+pub use act::{Act, Analysis, Content, Parse, Phrase, Sameness};
 pub use ground::{GroundPlace, Grounding, ground};
 pub use names::Name;
 pub use normalise::MAX_TEXT_BYTES;
-pub use parse::{parse, parse_query};
+pub use parse::{parse, parse_hearings, parse_query};
 pub use relation::Relation;
-pub use typed::{understand, words};
-pub use words::NOT_UNDERSTOOD;
-
-use serde::{Deserialize, Serialize};
-
-/// What a text says.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Parse {
-    /// In the order said; empty if nothing was understood.
-    pub acts: Vec<Act>,
-    /// The acts in writing: `label(here,kitchen)`, `loc(kitchen,down,hallway)`, `ask(where,gym)`,
-    /// joined by `&`; `none` if there is none. The grammar stands in `language/words.rs`.
-    pub notation: String,
-}
-
-/// One thing said.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Act {
-    /// "This is the gym": the place held is called so.
-    Label {
-        /// The name.
-        name: Name,
-        /// Whether the guide says it is a place seen before.
-        again: Sameness,
-    },
-    /// "The kitchen is down the hall".
-    Locate {
-        /// What is located.
-        figure: Name,
-        /// How it lies to the landmark.
-        relation: Relation,
-        /// What it is located by.
-        landmark: Landmark,
-    },
-    /// "Where is the gym?"
-    AskWhere {
-        /// What is asked for.
-        name: Name,
-    },
-}
-
-/// What a guide says about having been here before.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Sameness {
-    /// "back at the lobby", "the lobby again": the one named so before.
-    Same,
-    /// "another lobby", "a different lobby": not the one named so before.
-    Other,
-    /// Nothing said.
-    Open,
-}
-
-/// What a figure is located by.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Landmark {
-    /// A named place.
-    Name(Name),
-    /// The place held: "near here".
-    Here,
-}
+pub use words::{NOT_UNDERSTOOD, words};

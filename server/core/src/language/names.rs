@@ -1,8 +1,8 @@
 //! Names of places: one spelling for all that people say and write for the same.
 
 use super::lexicon::{
-    apart, is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise, is_weak, same_pair,
-    same_word, singular,
+    concept, hypernym, is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise,
+    is_thing, is_weak, singular, unified,
 };
 use super::normalise::{COMMA, sentences};
 use super::numbers::{is_number, numbers_as_spoken};
@@ -26,6 +26,10 @@ pub(super) enum Kind {
     Place,
     /// Unknown, and nothing speaks against it.
     Open,
+    /// Its head noun names a thing that places are told by: a table, a corner.
+    Thing,
+    /// A place that nothing tells from others: "the room", "the area".
+    Vague,
     /// It names something else.
     No,
 }
@@ -34,7 +38,8 @@ impl Name {
     /// From what a person wrote; none if no word is left ("the").
     pub fn new(text: &str) -> Option<Self> {
         let sentence = sentences(text).into_iter().next()?;
-        let words: Vec<&str> = sentence.words.iter().map(String::as_str).filter(|w| *w != COMMA).collect();
+        let words: Vec<&str> =
+            sentence.words.iter().map(|w| w.text.as_str()).filter(|w| *w != COMMA).collect();
         Self::from_words(&words)
     }
 
@@ -52,6 +57,12 @@ impl Name {
         &self.0
     }
 
+    /// The kind of its concept, if the lexicon has one: "lobby" for an elevator lobby, "lab" for a robotics
+    /// lab.
+    pub fn hypernym(&self) -> Option<&str> {
+        hypernym(&self.0).or_else(|| self.0.split_once(' ').and_then(|(_, last)| concept(last).map(|_| last)))
+    }
+
     /// What speaks for it being a place's name.
     pub(super) fn kind(&self) -> Kind {
         let words: Vec<&str> = self.0.split(' ').collect();
@@ -66,7 +77,10 @@ impl Name {
         if is_generic(noun) {
             let numbered = at + 1 < words.len() && words[at + 1] != "of";
             let told = modifiers.iter().any(|w| !is_weak(w) && !w.ends_with("est"));
-            return if numbered || told { Kind::Place } else { Kind::No };
+            return if numbered || told { Kind::Place } else { Kind::Vague };
+        }
+        if is_thing(noun) || (at > 0 && is_thing(&words[at - 1..=at].join(" "))) {
+            return Kind::Thing;
         }
         let late_gerund = words.iter().skip(1).any(|w| w.ends_with("ing"));
         // "The only parameter" is no place, nor is "the stock market's end".
@@ -119,18 +133,12 @@ fn canonical(words: &[&str]) -> Vec<String> {
         let one = singular(view[at]);
         kept[at] = one;
     }
-    let parts: Vec<String> = kept
-        .iter()
-        .flat_map(|w| apart(w).map_or_else(|| vec![w.clone()], |p| p.iter().map(|&s| s.to_owned()).collect()))
-        .collect();
-    let mut words: Vec<String> = Vec::with_capacity(parts.len());
+    let mut words: Vec<String> = Vec::with_capacity(kept.len() + 1);
     let mut at = 0;
-    while at < parts.len() {
-        let pair = parts.get(at + 1).and_then(|next| same_pair(&parts[at], next));
-        match pair {
-            Some(to) => words.extend(to.iter().map(|&w| w.to_owned())),
-            None => words.push(same_word(&parts[at]).to_owned()),
-        }
+    while at < kept.len() {
+        let pair = kept.get(at + 1).and_then(|next| unified(&format!("{} {next}", kept[at])));
+        let said = pair.or_else(|| unified(&kept[at])).unwrap_or(&kept[at]);
+        words.extend(said.split(' ').map(str::to_owned));
         at += 1 + usize::from(pair.is_some());
     }
     plain_hall_is_hallway(&mut words);
@@ -229,16 +237,16 @@ mod tests {
             ("information desk", Kind::Place),
             ("Z-center", Kind::Place),
             ("department of linguistics", Kind::Place),
-            ("mural", Kind::Open),
+            ("fishbowl", Kind::Open),
             ("vending machines", Kind::Place),
-            ("large room", Kind::No),
+            ("large room", Kind::Vague),
             ("next room", Kind::No),
-            ("end of the hall", Kind::No),
+            ("end of the hall", Kind::Thing),
             ("plan", Kind::No),
             ("best", Kind::No),
             ("greatest", Kind::No),
             ("situation", Kind::No),
-            ("kitchen table", Kind::No),
+            ("kitchen table", Kind::Thing),
             ("one", Kind::No),
             ("five", Kind::No),
         ] {

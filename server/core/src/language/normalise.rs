@@ -7,11 +7,19 @@ pub const MAX_TEXT_BYTES: usize = 4096;
 /// The token for a comma, colon, dash or bracket inside a sentence.
 pub(super) const COMMA: &str = ",";
 
-/// A sentence as words of lower case and [`COMMA`]s.
+/// A word of lower case, or [`COMMA`].
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) struct Word {
+    pub(super) text: String,
+    /// It was written with a capital in a text that has small letters, too.
+    pub(super) capital: bool,
+}
+
+/// A sentence as plain words.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Sentence {
     /// Words; contractions are taken apart ("we're" is "we are"), a possessive keeps its 's.
-    pub(super) words: Vec<String>,
+    pub(super) words: Vec<Word>,
     /// It ended in a question mark.
     pub(super) question: bool,
 }
@@ -21,7 +29,11 @@ pub(super) fn sentences(text: &str) -> Vec<Sentence> {
     if text.len() > MAX_TEXT_BYTES {
         return Vec::new();
     }
-    let chars: Vec<char> = text.chars().flat_map(char::to_lowercase).map(plain).collect();
+    let mixed = text.chars().any(char::is_lowercase);
+    let (chars, upper): (Vec<char>, Vec<bool>) = text
+        .chars()
+        .flat_map(|c| c.to_lowercase().map(move |low| (plain(low), c.is_uppercase() && mixed)))
+        .unzip();
     let mut done = Vec::new();
     let mut now = Sentence::default();
     let mut at = 0;
@@ -30,7 +42,7 @@ pub(super) fn sentences(text: &str) -> Vec<Sentence> {
         let next = chars.get(at + 1).copied();
         if c.is_alphanumeric() {
             let end = word_end(&chars, at);
-            now.words.push(chars[at..end].iter().collect());
+            now.words.push(Word { text: chars[at..end].iter().collect(), capital: upper[at] });
             at = end;
             continue;
         }
@@ -39,7 +51,7 @@ pub(super) fn sentences(text: &str) -> Vec<Sentence> {
             '?' | '!' | '.' | '…' | ';' | '\n' | '\r' => finish(&mut now, &mut done, c == '?'),
             ',' | ':' | '(' | ')' | '[' | ']' | '–' | '—' => push_comma(&mut now),
             '-' if next.is_none_or(|n| !n.is_alphanumeric()) => push_comma(&mut now),
-            '&' => now.words.push("and".to_owned()),
+            '&' => now.words.push(small("and")),
             _ => {}
         }
         at += 1;
@@ -86,19 +98,19 @@ fn plain(c: char) -> char {
 }
 
 fn ends_abbreviation(now: &Sentence) -> bool {
-    now.words.last().is_some_and(|w| matches!(w.as_str(), "dr" | "mr" | "mrs" | "ms" | "prof" | "st" | "no"))
+    now.words.last().is_some_and(|w| matches!(w.text.as_str(), "dr" | "mr" | "mrs" | "ms" | "prof" | "st" | "no"))
         // "no." ends a sentence when it is all of it.
-        && !(now.words.len() == 1 && now.words[0] == "no")
+        && !(now.words.len() == 1 && now.words[0].text == "no")
 }
 
 fn push_comma(now: &mut Sentence) {
-    if now.words.last().is_some_and(|w| w != COMMA) {
-        now.words.push(COMMA.to_owned());
+    if now.words.last().is_some_and(|w| w.text != COMMA) {
+        now.words.push(small(COMMA));
     }
 }
 
 fn finish(now: &mut Sentence, done: &mut Vec<Sentence>, question: bool) {
-    if now.words.last().is_some_and(|w| w == COMMA) {
+    if now.words.last().is_some_and(|w| w.text == COMMA) {
         now.words.pop();
     }
     if !now.words.is_empty() {
@@ -106,20 +118,28 @@ fn finish(now: &mut Sentence, done: &mut Vec<Sentence>, question: bool) {
     }
 }
 
+fn small(text: &str) -> Word {
+    Word { text: text.to_owned(), capital: false }
+}
+
 /// Takes contractions apart and mends what phones write.
-fn expand(words: &[String]) -> Vec<String> {
-    let mut out: Vec<String> = Vec::with_capacity(words.len() + 4);
+fn expand(words: &[Word]) -> Vec<Word> {
+    let mut out: Vec<Word> = Vec::with_capacity(words.len() + 4);
     for (at, word) in words.iter().enumerate() {
-        let next = words.get(at + 1).map_or("", String::as_str);
-        if let Some(apart) = contraction(word) {
-            out.extend(apart.iter().map(|&w| w.to_owned()));
-        } else if let Some(stem) = word.strip_suffix("n't") {
-            out.push(if word == "can't" { "can".to_owned() } else { stem.to_owned() });
-            out.push("not".to_owned());
-        } else if let Some(stem) = word.strip_suffix("'s").filter(|_| starts_place_phrase(next)) {
+        let next = words.get(at + 1).map_or("", |w| w.text.as_str());
+        let text = word.text.as_str();
+        let stem = |stem: &str| Word { text: stem.to_owned(), capital: word.capital };
+        if let Some(apart) = contraction(text) {
+            out.extend(apart.split(' ').map(small));
+        } else if text == "its" && (starts_place_phrase(next) || matches!(next, "the" | "a" | "an")) {
+            out.extend(["it", "is"].map(small));
+        } else if let Some(verb) = text.strip_suffix("n't") {
+            out.extend([stem(verb), small("not")]);
+        } else if let Some(verb) = text.strip_suffix("'ll") {
+            out.extend([stem(verb), small("will")]);
+        } else if let Some(noun) = text.strip_suffix("'s").filter(|_| starts_place_phrase(next)) {
             // "the kitchen's down the hall"
-            out.push(stem.to_owned());
-            out.push("is".to_owned());
+            out.extend([stem(noun), small("is")]);
         } else {
             out.push(word.clone());
         }
@@ -127,49 +147,55 @@ fn expand(words: &[String]) -> Vec<String> {
     out
 }
 
+/// After a noun with 's, does this word make it "is" rather than "of"?
 fn starts_place_phrase(word: &str) -> bool {
-    matches!(
-        word,
-        "down"
-            | "near"
-            | "through"
-            | "next"
-            | "away"
-            | "just"
-            | "right"
-            | "by"
-            | "close"
-            | "beside"
-            | "along"
-            | "not"
-    )
+    const STARTS: &str = "a about above across adjacent after ahead along an around at away behind below beside \
+        between beyond by close down downstairs far four in inside just located near next north not on one opposite \
+        out outside over past right south straight the three through to two under up upstairs";
+    !word.is_empty() && STARTS.split(' ').any(|w| w == word)
 }
 
-fn contraction(word: &str) -> Option<&'static [&'static str]> {
+fn contraction(word: &str) -> Option<&'static str> {
     Some(match word {
-        "i'm" | "im" => &["i", "am"],
-        "we're" => &["we", "are"],
-        "you're" | "youre" => &["you", "are"],
-        "they're" => &["they", "are"],
-        "it's" => &["it", "is"],
-        "that's" | "thats" => &["that", "is"],
-        "this's" => &["this", "is"],
-        "here's" | "heres" => &["here", "is"],
-        "here're" => &["here", "are"],
-        "there's" | "theres" => &["there", "is"],
-        "where's" | "wheres" => &["where", "is"],
-        "where're" => &["where", "are"],
-        "what's" | "whats" => &["what", "is"],
-        "we've" => &["we", "have"],
-        "i've" => &["i", "have"],
-        "you've" => &["you", "have"],
-        "you'll" => &["you", "will"],
-        "we'll" => &["we", "will"],
-        "thru" => &["through"],
-        "ur" => &["your"],
-        "isnt" => &["is", "not"],
-        "arent" => &["are", "not"],
-        "nearby" => &["near", "here"],
+        "i'm" | "im" => "i am",
+        "we're" => "we are",
+        "you're" | "youre" => "you are",
+        "they're" => "they are",
+        "it's" => "it is",
+        "that's" | "thats" => "that is",
+        "this's" => "this is",
+        "he's" => "he is",
+        "she's" => "she is",
+        "who's" => "who is",
+        "how's" => "how is",
+        "here's" | "heres" => "here is",
+        "here're" => "here are",
+        "there's" | "theres" => "there is",
+        "there're" => "there are",
+        "where's" | "wheres" => "where is",
+        "where're" => "where are",
+        "what's" | "whats" => "what is",
+        "let's" | "lets" => "let us",
+        "we've" => "we have",
+        "i've" => "i have",
+        "you've" => "you have",
+        "i'd" => "i would",
+        "we'd" => "we would",
+        "you'd" => "you would",
+        "can't" | "cannot" | "cant" => "can not",
+        "won't" | "wont" => "will not",
+        "ain't" => "is not",
+        "thru" => "through",
+        "ur" => "your",
+        "u" => "you",
+        "isnt" => "is not",
+        "arent" => "are not",
+        "wasnt" => "was not",
+        "dont" => "do not",
+        "doesnt" => "does not",
+        "didnt" => "did not",
+        "nearby" => "near here",
+        "gonna" => "going to",
         _ => return None,
     })
 }
@@ -179,7 +205,13 @@ mod tests {
     use super::*;
 
     fn plain_words(text: &str) -> Vec<String> {
-        sentences(text).iter().map(|s| s.words.join(" ") + if s.question { "?" } else { "" }).collect()
+        sentences(text)
+            .iter()
+            .map(|s| {
+                s.words.iter().map(|w| w.text.as_str()).collect::<Vec<_>>().join(" ")
+                    + if s.question { "?" } else { "" }
+            })
+            .collect()
     }
 
     #[test]

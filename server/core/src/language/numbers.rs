@@ -21,6 +21,25 @@ pub(super) fn is_number(word: &str) -> bool {
     digits_of(word).is_some() || matches!(word, "hundred" | "oh")
 }
 
+/// The number that a word says as a count: "two", "3", "couple"; at most 99.
+pub(super) fn counted(word: &str) -> Option<u32> {
+    match word {
+        "couple" => Some(2),
+        _ => digits_of(word).filter(|d| d.len() < 3).and_then(|d| d.parse().ok()),
+    }
+}
+
+/// The quantity said from `at` on ("twenty five", "one hundred fifty", "30", "a couple of"), and one
+/// past its last word; none if no number stands there.
+pub(super) fn quantity(words: &[String], at: usize) -> Option<(f64, usize)> {
+    let (digits, end) = run(words, at);
+    // Digits that no length needs are not read as one.
+    if end > at && digits.len() < 7 {
+        return digits.parse().ok().map(|n| (n, end));
+    }
+    None
+}
+
 /// Rewrites every run of numbers in the spoken form.
 pub(super) fn numbers_as_spoken(words: &[String]) -> Vec<String> {
     let mut out = Vec::with_capacity(words.len());

@@ -1,93 +1,214 @@
-//! Acts in writing, for reports, and in words, for the guide.
-//!
-//! ```text
-//! notation = act {"&" act} | "none"
-//! act      = "label(here," NAME ")" ["&same(here," NAME ")" | "&other(here," NAME ")"]
-//!          | "loc(" NAME "," RELATION "," (NAME | "here") ")" | "ask(where," NAME ")"
-//! RELATION = "through" | "down" | "away_from" | "near"
-//! NAME     = the canonical name with "_" for spaces
-//! ```
+//! Acts in words, for the guide: what was understood.
 
-use super::{Act, Landmark, Name, Sameness};
+use super::act::{
+    About, Act, Content, Head, Locate, Ordinal, Owner, Phrase, Quantity, Question, Reason, Restriction,
+    Sameness, Unit,
+};
+use super::names::Name;
+use super::relation::Relation;
 
 /// What the guide is told when nothing was understood.
 pub const NOT_UNDERSTOOD: &str = "I did not understand; nothing was changed. Try: this is the kitchen.";
 
-/// The acts in writing; `none` if there is none.
-pub(super) fn notation(acts: &[Act]) -> String {
-    if acts.is_empty() {
-        return "none".to_owned();
-    }
-    acts.iter().map(act_notation).collect::<Vec<_>>().join("&")
-}
-
-fn act_notation(act: &Act) -> String {
-    let written = |name: &Name| name.as_str().replace(' ', "_");
-    match act {
-        Act::Label { name, again } => {
-            let name = written(name);
-            match again {
-                Sameness::Same => format!("label(here,{name})&same(here,{name})"),
-                Sameness::Other => format!("label(here,{name})&other(here,{name})"),
-                Sameness::Open => format!("label(here,{name})"),
-            }
-        }
-        Act::Locate { figure, relation, landmark } => {
-            let relation = relation.notation();
-            let landmark = match landmark {
-                Landmark::Name(name) => written(name),
-                Landmark::Here => "here".to_owned(),
-            };
-            format!("loc({},{relation},{landmark})", written(figure))
-        }
-        Act::AskWhere { name } => format!("ask(where,{})", written(name)),
-    }
-}
-
 /// The acts in words: "I heard: the gym is down the hallway. I don't know of a hallway yet."
 /// `known` tells whether a landmark's name has been taught; it is asked about no other name.
 pub fn words(acts: &[Act], known: impl Fn(&Name) -> bool) -> String {
-    if acts.is_empty() {
-        return NOT_UNDERSTOOD.to_owned();
+    match acts {
+        [] => return NOT_UNDERSTOOD.to_owned(),
+        [Act { content: Content::Ignored(reason), .. }] => return ignored(*reason).to_owned(),
+        _ => {}
     }
-    let heard: Vec<String> = acts.iter().map(clause).collect();
-    let question = matches!(acts.last(), Some(Act::AskWhere { .. }));
+    let heard: Vec<String> =
+        acts.iter().map(|a| format!("{}{}", doubt(a.certainty), clause(&a.content))).collect();
+    let question = matches!(acts.last(), Some(Act { content: Content::Ask { .. }, .. }));
     let mut text = format!("I heard: {}{}", heard.join(", and "), if question { "?" } else { "." });
-    let mut missing: Vec<&Name> = Vec::new();
+    let mut missing: Vec<Name> = Vec::new();
     for act in acts {
-        if let Act::Locate { landmark: Landmark::Name(name), .. } = act
-            && !missing.contains(&name)
-            && !known(name)
-        {
-            missing.push(name);
-            text.extend([" I don't know of ", &with_indefinite(name), " yet."]);
+        let Content::Locate(locate) = &act.content else { continue };
+        for name in locate.landmarks.iter().filter_map(Phrase::label) {
+            if !missing.contains(&name) && !known(&name) {
+                text.extend([" I don't know of ", &with_indefinite(&name), " yet."]);
+                missing.push(name);
+            }
         }
     }
     text
 }
 
-fn clause(act: &Act) -> String {
-    match act {
-        Act::Label { name, again: Sameness::Open } => format!("you are in {}", name.with_article()),
-        Act::Label { name, again: Sameness::Same } => format!("you are back in {}", name.with_article()),
-        Act::Label { name, again: Sameness::Other } => format!("you are in another {name}"),
-        Act::Locate { figure, relation, landmark } => {
-            let relation = relation.words();
-            let verb = if is_plural_only(figure) { "are" } else { "is" };
-            let landmark = match landmark {
-                Landmark::Name(name) => name.with_article(),
-                Landmark::Here => "here".to_owned(),
-            };
-            format!("{} {verb} {relation} {landmark}", figure.with_article())
-        }
-        Act::AskWhere { name } => {
-            format!("where {} {}", if is_plural_only(name) { "are" } else { "is" }, name.with_article())
-        }
+fn ignored(reason: Reason) -> &'static str {
+    match reason {
+        Reason::Command => "I heard an order; I only make maps. Nothing was changed.",
+        Reason::Idiom => "I heard a figure of speech; nothing was changed.",
+        Reason::Chatter => NOT_UNDERSTOOD,
     }
 }
 
-fn is_plural_only(name: &Name) -> bool {
-    name.as_str().ends_with("stairs")
+fn doubt(certainty: f64) -> &'static str {
+    match certainty {
+        c if c >= 1.0 => "",
+        c if c > 0.6 => "probably, ",
+        _ => "maybe, ",
+    }
+}
+
+fn clause(content: &Content) -> String {
+    match content {
+        Content::Label { at, what, sameness } => label(at, what, *sameness),
+        Content::Locate(locate) => located(locate),
+        Content::Alias { what, also } => format!("{} is also called {}", said(what), said(also)),
+        Content::Attribute { what, value } => format!("{} {} {value}", said(what), verb(what)),
+        Content::Negate(inner) => format!("it is not so that {}", clause(inner)),
+        Content::Correct { was: None, is } => format!("{}, whatever was said before", clause(is)),
+        Content::Correct { was: Some(was), is } => format!("{}, and not that {}", clause(is), clause(was)),
+        Content::Same { what, like, same } => {
+            let how = if *same { "the same place as" } else { "another place than" };
+            format!("{} {} {how} {}", said(what), verb(what), said(like))
+        }
+        Content::Ask { kind, about } => asked(*kind, about),
+        Content::Generic { figure, relation, landmark, quantity } => {
+            let often = match quantity {
+                Quantity::All => "always",
+                Quantity::Usually => "usually",
+                Quantity::Sometimes => "sometimes",
+                Quantity::Never => "never",
+            };
+            format!("in general, {} is {often} {} {}", said(figure), relation.words(), said(landmark))
+        }
+        Content::Route { then: None, .. } => "directions, which I do not follow".to_owned(),
+        Content::Route { then: Some(then), .. } => format!("directions, at whose end {}", clause(then)),
+        Content::Ignored(_) => "something that says nothing of places".to_owned(),
+    }
+}
+
+fn label(at: &Phrase, what: &Phrase, sameness: Sameness) -> String {
+    if at.head == Head::Here {
+        return match sameness {
+            Sameness::Open => format!("you are in {}", said(what)),
+            Sameness::Same => format!("you are back in {}", said(what)),
+            Sameness::Other => format!("you are in another {}", said(what).trim_start_matches("the ")),
+        };
+    }
+    format!("{} is called {}", said(at), said(what))
+}
+
+fn located(locate: &Locate) -> String {
+    let place = related(&Restriction {
+        relation: locate.relation,
+        modifiers: locate.modifiers,
+        landmarks: locate.landmarks.clone(),
+    });
+    let guess = if locate.repaired { ", if I heard the name right" } else { "" };
+    format!("{} {} {place}{guess}", said(&locate.figure), verb(&locate.figure))
+}
+
+fn related(r: &Restriction) -> String {
+    let mut words = Vec::new();
+    if r.modifiers.just {
+        words.push("just".to_owned());
+    }
+    if let Some(d) = r.modifiers.distance {
+        let unit = match d.unit {
+            Unit::Metre => "metres",
+            Unit::Foot => "feet",
+            Unit::Yard => "yards",
+            Unit::Step => "steps",
+        };
+        words.push(format!("{} {unit}", d.value));
+    }
+    if let Some(n) = r.modifiers.count {
+        words.push(format!("{n} levels"));
+    }
+    let landmarks: Vec<String> = r.landmarks.iter().map(said).collect();
+    words.push(fixed(r).unwrap_or_else(|| format!("{} {}", r.relation.words(), landmarks.join(" and "))));
+    words.join(" ")
+}
+
+/// Relations that are said without "the landmark".
+fn fixed(r: &Restriction) -> Option<String> {
+    let head = &r.landmarks.first()?.head;
+    let text = match (r.relation, head) {
+        (Relation::LeftSide, Head::Path) => "on the left",
+        (Relation::RightSide, Head::Path) => "on the right",
+        (Relation::LeftOf, Head::Agent) => "on your left",
+        (Relation::RightOf, Head::Agent) => "on your right",
+        (Relation::LeftOf, Head::Speaker) => "on my left",
+        (Relation::RightOf, Head::Speaker) => "on my right",
+        (Relation::AheadOf, Head::Agent) => "straight ahead",
+        (Relation::LevelUp, Head::Here) => "upstairs",
+        (Relation::LevelDown, Head::Here) => "downstairs",
+        (Relation::NextTo, Head::Here) => "next door",
+        (Relation::At, Head::There) => "there",
+        (Relation::At, Head::Here) => "here",
+        _ => return None,
+    };
+    Some(text.to_owned())
+}
+
+fn asked(kind: Question, about: &About) -> String {
+    match (kind, about) {
+        (Question::Where, About::Phrase(p)) => format!("where {} {}", verb(p), said(p)),
+        (Question::What, About::Phrase(p)) => format!("what {} {}", verb(p), said(p)),
+        (Question::Route, About::Phrase(p)) => format!("how do you get to {}", said(p)),
+        (Question::HowFar, About::Phrase(p)) => format!("how far {} {}", verb(p), said(p)),
+        (Question::Why, About::Content(c)) => format!("why do I think that {}", clause(c)),
+        (_, About::Content(c)) => format!("is it so that {}", clause(c)),
+        (_, About::Phrase(p)) => format!("what of {}", said(p)),
+    }
+}
+
+/// A phrase as one says it: "the second door on the right".
+fn said(phrase: &Phrase) -> String {
+    let within: String = phrase.within.iter().map(|r| format!(" {}", related(r))).collect();
+    let f = &phrase.features;
+    let name = match (&phrase.head, phrase.label()) {
+        (_, Some(name)) if f.ordinal.is_none() && f.count.is_none() && f.owner.is_none() => {
+            name.with_article()
+        }
+        (Head::Named(kind), label) => {
+            let owner = match &f.owner {
+                Some(Owner::Speaker) => "my ",
+                Some(Owner::Named(_)) => "",
+                None => "the ",
+            };
+            let nth = match f.ordinal {
+                Some(Ordinal::Nth(n)) => format!("{} ", nth(n)),
+                Some(Ordinal::Last) => "last ".to_owned(),
+                Some(Ordinal::Next) => "next ".to_owned(),
+                None => f.count.map_or_else(String::new, |n| format!("{} ", nth(n))),
+            };
+            let name = label.as_ref().map_or(kind.as_str(), Name::as_str);
+            format!("{owner}{nth}{name}")
+        }
+        (head, _) => pointer(head).to_owned(),
+    };
+    format!("{name}{within}")
+}
+
+fn nth(n: u32) -> String {
+    const NTH: [&str; 11] =
+        ["", "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth"];
+    NTH.get(n as usize).filter(|w| !w.is_empty()).map_or_else(|| format!("{n}th"), |w| (*w).to_owned())
+}
+
+fn pointer(head: &Head) -> &'static str {
+    match head {
+        Head::Here => "here",
+        Head::There => "that place",
+        Head::It => "it",
+        Head::Agent => "you",
+        Head::Speaker => "me",
+        Head::Path => "the way",
+        Head::Previous => "the place we just left",
+        Head::Start => "where we started",
+        Head::Unknown => "the place",
+        Head::Visited => "a place seen before",
+        Head::Any | Head::Place | Head::Named(_) => "some place",
+    }
+}
+
+fn verb(phrase: &Phrase) -> &'static str {
+    let stairs = phrase.label().is_some_and(|n| n.as_str().ends_with("stairs"));
+    if stairs { "are" } else { "is" }
 }
 
 /// "a hallway", "an elevator", "lecture hall five".
@@ -96,41 +217,8 @@ fn with_indefinite(name: &Name) -> String {
     if !name.with_article().starts_with("the ") {
         return text.to_owned();
     }
-    if is_plural_only(name) {
+    if text.ends_with("stairs") {
         return format!("any {text}");
     }
     format!("{} {text}", if text.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::super::parse;
-    use super::*;
-
-    #[test]
-    fn the_guide_is_told_what_was_understood() {
-        for (text, said) in [
-            ("this is the gym", "I heard: you are in the gym."),
-            ("We're back at the gym", "I heard: you are back in the gym."),
-            ("this is another lecture hall", "I heard: you are in another lecture hall."),
-            ("this is lecture hall 123", "I heard: you are in lecture hall one twenty three."),
-            ("the lab is near the lobby", "I heard: the lab is near the lobby."),
-            (
-                "the gym is down the hall",
-                "I heard: the gym is down the hallway. I don't know of a hallway yet.",
-            ),
-            (
-                "the stairs are near the exit",
-                "I heard: the stairs are near the exit. I don't know of an exit yet.",
-            ),
-            ("where is the gym", "I heard: where is the gym?"),
-            (
-                "this is the kitchen and the lounge is next door",
-                "I heard: you are in the kitchen, and the lounge is near here.",
-            ),
-            ("tralala", NOT_UNDERSTOOD),
-        ] {
-            assert_eq!(words(&parse(text).acts, |name| name.as_str() == "lobby"), said);
-        }
-    }
 }

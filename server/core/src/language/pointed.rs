@@ -1,0 +1,230 @@
+//! "This is …", "that was …", "it is …": what is said of a place that one points at.
+
+use super::act::{Content, Head, Owner, Phrase, Sameness};
+use super::build::{Readings, label, locate_all, one, shaped};
+use super::copula::Copula;
+use super::cursor::Cursor;
+use super::describe::attribute;
+use super::label::{SPOT, called, named, plausible};
+use super::names::{Kind, Name};
+use super::noun_phrase::{Determiner, NounPhrase};
+use super::relate::Related;
+use super::relation::Relation as R;
+
+/// "This is the gym", "that was not the lounge", "it's the second door on the right".
+pub(super) fn pointed(at: &mut Cursor) -> Option<Readings> {
+    let spot = at.sees(SPOT);
+    let head = subject(at)?;
+    let verb = at.copula()?;
+    let head = match head {
+        Head::There if verb.past => Head::Previous,
+        Head::Here | Head::There | Head::It if verb.past => return None,
+        head => head,
+    };
+    if verb.future {
+        // "This will be the gym" is not the gym yet.
+        return None;
+    }
+    predicate(at, head, spot, &verb).map(|readings| shaped(readings, &verb))
+}
+
+fn subject(at: &mut Cursor) -> Option<Head> {
+    if at.just_left() {
+        return Some(Head::Previous);
+    }
+    let here = at.eat_any(
+        "this thing here|this right here|this here|where we are standing|where we are now|where we are|\
+         the place we are in|the room we are in now|the room we are in|the room you are in|the place where we are|\
+         the room where we are|what you see here",
+    );
+    if here.is_some() || at.eat_any(SPOT).is_some() {
+        return Some(Head::Here);
+    }
+    if at.eat_any("that place|that room over there|that room|that one|that over there").is_some() {
+        return Some(Head::There);
+    }
+    let word = at.eat_any("this|these|here|that|it")?;
+    Some(match word {
+        "that" => Head::There,
+        "it" => Head::It,
+        _ => Head::Here,
+    })
+}
+
+/// What is said of the place pointed at.
+fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<Readings> {
+    let start = *at;
+    if at
+        .eat_any(
+            "also called|also known as|also named|called|known as|named|referred to as|known to everyone as",
+        )
+        .is_some()
+    {
+        // "This place is called Nirvana"; "this is called teamwork" is less clear.
+        return named(at).filter(|p| spot || plausible(p)).map(|p| called(at, head, p, false));
+    }
+    if let Some(same) = same_place(at, &head) {
+        return Some(one(same));
+    }
+    *at = start;
+    if let Some(place) = where_kept(at) {
+        return Some(one(label(head, place, Sameness::Open)));
+    }
+    *at = start;
+    if let Some(owner) = at.owner_alone() {
+        return Some(one(label(head, owned_room(owner)?, Sameness::Open)));
+    }
+    *at = start;
+    let again = verb.again || at.eat_any("back").is_some();
+    at.eat_any("in|at").filter(|_| again);
+    if let Some(readings) = named_predicate(at, &head, again) {
+        return Some(readings);
+    }
+    *at = start;
+    if let Some(value) = attribute(at).filter(|_| head == Head::Here && at.at_break()) {
+        return Some(one(Content::Attribute { what: Phrase::new(head), value }));
+    }
+    *at = start;
+    related_predicate(at, head)
+}
+
+fn named_predicate(at: &mut Cursor, head: &Head, again: bool) -> Option<Readings> {
+    let phrase = at.noun_phrase().filter(|p| p.determiner != Determiner::Demonstrative)?;
+    if phrase.phrase.features.ordinal.is_some() {
+        return in_a_row(at, head, &phrase);
+    }
+    if !matches!(phrase.kind, Kind::Place | Kind::Open | Kind::Vague)
+        || (*head == Head::It && phrase.kind != Kind::Place)
+    {
+        return None;
+    }
+    let told = phrase.kind == Kind::Vague && phrase.determiner == Determiner::Definite;
+    (plausible(&phrase) || told || phrase.phrase.features.owner.is_some())
+        .then(|| called(at, head.clone(), phrase.clone(), again))
+        .filter(|_| {
+            phrase.kind != Kind::Vague
+                || phrase.phrase.features.owner.is_some()
+                || at.before() != last_word(&phrase)
+        })
+}
+
+fn last_word(phrase: &NounPhrase) -> &str {
+    match &phrase.phrase.head {
+        Head::Named(name) => name.as_str().rsplit(' ').next().unwrap_or(""),
+        _ => "",
+    }
+}
+
+/// "The second door on the right".
+fn in_a_row(at: &mut Cursor, head: &Head, phrase: &NounPhrase) -> Option<Readings> {
+    if !matches!(phrase.kind, Kind::Place | Kind::Vague) {
+        return None;
+    }
+    let chain = at.chain(true);
+    if chain.is_empty() {
+        return None;
+    }
+    let figure = Phrase::new(head.clone());
+    let readings = chain.restrict(&phrase.phrase);
+    let at_door = |p: &Phrase| Related::to(R::At, p.clone());
+    let grounds = readings.into_iter().map(|(w, p)| (w, vec![at_door(&p)])).collect();
+    Some(locate_all(&[vec![(1.0, figure)]], &grounds))
+}
+
+/// "Next to the gym", said of the place pointed at.
+pub(super) fn related_predicate(at: &mut Cursor, head: Head) -> Option<Readings> {
+    let chain = at.chain(false);
+    let first = chain.first()?;
+    let pointless = matches!(first.relation, R::To | R::In | R::On | R::At | R::Contains) && !chain.sure();
+    // "It is by the door" tells where some thing is.
+    let vague = first.landmarks.iter().any(|l| l.label().is_some()) && !chain.sure();
+    let door = first.landmarks.iter().all(|l| l.label().is_some_and(|n| n.as_str().ends_with("door")))
+        && first.relation != R::Through;
+    if head == Head::There || (vague && first.relation != R::Around) || pointless || door {
+        return None;
+    }
+    // "This is on your left" says nothing of where this is.
+    let mine = first
+        .landmarks
+        .iter()
+        .any(|l| matches!(l.head, Head::Agent | Head::Speaker | Head::Path | Head::Here));
+    if head == Head::Here && mine {
+        return None;
+    }
+    Some(locate_all(&[vec![(1.0, Phrase::new(head))]], &chain.attach()))
+}
+
+/// "Where we started", "the same place as before", "somewhere we have been".
+pub(super) fn same_place(at: &mut Cursor, head: &Head) -> Option<Content> {
+    let what = Phrase::new(head.clone());
+    let start = *at;
+    at.skip("back|right|exactly|just");
+    if let Some(phrase) =
+        at.pointer().filter(|p| matches!(p.head, Head::Start | Head::Previous | Head::Visited))
+    {
+        at.skip("again");
+        return Some(Content::Same { what, like: phrase, same: true });
+    }
+    *at = start;
+    if at.eat_any("a different place|another place|somewhere else|a different one|another one|a different spot|someplace else|a new place").is_some() {
+        let like = if at.eat("from") { at.landmark()?.0 } else { Phrase::new(Head::Visited) };
+        return Some(Content::Same { what, like, same: false });
+    }
+    at.eat_any("the very same|the exact same|the same")?;
+    at.eat_any("place|one|room|spot|area|location")?;
+    if at
+        .eat_any(
+            "where we started|that we started|we started from|we started in|we started at|we started|we came in|we began",
+        )
+        .is_some()
+    {
+        return Some(Content::Same { what, like: Phrase::new(Head::Start), same: true });
+    }
+    let like = if at.eat_any("as before|as earlier|as last time|again|as the one before|we saw before|we were in before|we were in earlier|as we were in before").is_some() || at.at_break() {
+        Phrase::new(Head::Visited)
+    } else {
+        at.skip("that|as");
+        at.landmark()?.0
+    };
+    Some(Content::Same { what, like, same: true })
+}
+
+/// "Where we keep the printers", "where people eat".
+pub(super) fn where_kept(at: &mut Cursor) -> Option<Phrase> {
+    at.eat_any("the place where|the room where|where")?;
+    let mut place = Phrase::new(Head::Place);
+    if at.eat_any("all the|the|all").is_some() || at.at_break() {
+        let thing = at.noun_phrase()?;
+        at.eat_any("are kept|is kept|are stored|are|is|live|lives|go|goes")?;
+        place.within.push(Related::to(R::Contains, thing.phrase).restriction());
+        return Some(place);
+    }
+    at.eat_any("we|they|you|people|students|everyone|everybody|i|the students|the staff|you can|we all|one")?;
+    at.skip("can|all|usually|always|often|normally|go to|like to|come to|will|sometimes|mostly");
+    if at.eat_any("keep|store|have|put|find|get|stash|leave|hide").is_some() {
+        at.skip("all|most of|some of|our|my|their");
+        let thing = at.noun_phrase()?;
+        let meal = ["lunch", "breakfast", "dinner", "meeting", "coffee", "class", "party"]
+            .iter()
+            .any(|w| thing.name().is_some_and(|n| n.as_str().ends_with(w)));
+        if !meal {
+            place.within.push(Related::to(R::Contains, thing.phrase).restriction());
+            return at.at_break().then_some(place);
+        }
+        place.features.purpose = thing.name().map(|n| format!("have {n}"));
+        return at.at_break().then_some(place);
+    }
+    let verb = at.eat_any(
+        "eat|drink|meet|work|sleep|cook|park|print|study|relax|rest|hang out|smoke|play|exercise|work out|hold|teach|\
+         have|take|make|wash|wait|gather|sit|read|pick up|drop off",
+    )?;
+    let rest = at.to_break();
+    place.features.purpose = Some([&[verb], rest.as_slice()].concat().join(" "));
+    (rest.len() <= 4).then_some(place)
+}
+
+fn owned_room(owner: Owner) -> Option<Phrase> {
+    let mut room = Phrase::new(Head::Named(Name::new("room")?));
+    room.features.owner = Some(owner);
+    Some(room)
+}

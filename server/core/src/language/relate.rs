@@ -1,0 +1,441 @@
+//! Prepositional phrases: how something lies to what.
+
+use super::act::{Distance, Features, Head, Modifiers, Phrase, Restriction, Unit};
+use super::cursor::Cursor;
+use super::lexicon::is_way;
+use super::names::{Kind, Name};
+use super::noun_phrase::Determiner;
+use super::numbers::quantity;
+use super::relation::Relation;
+use super::relation::Relation as R;
+
+/// "Just past the entrance".
+#[derive(Clone, Debug)]
+pub(super) struct Related {
+    pub(super) relation: Relation,
+    pub(super) modifiers: Modifiers,
+    pub(super) landmarks: Vec<Phrase>,
+    /// A landmark surely is a place.
+    pub(super) sure: bool,
+    /// The landmark is one that the listener knows: "the lobby", "here".
+    pub(super) definite: bool,
+}
+
+impl Related {
+    pub(super) fn to(relation: Relation, landmark: Phrase) -> Self {
+        Self {
+            relation,
+            modifiers: Modifiers::default(),
+            landmarks: vec![landmark],
+            sure: false,
+            definite: true,
+        }
+    }
+
+    pub(super) fn restriction(&self) -> Restriction {
+        Restriction { relation: self.relation, modifiers: self.modifiers, landmarks: self.landmarks.clone() }
+    }
+}
+
+/// Prepositions and their relations; what begins another comes after it.
+const PREPOSITIONS: [(&str, R); 34] = [
+    ("in front of|before|outside the front of", R::InFrontOf),
+    ("on the other side of|on the far side of|on the opposite side of|over on the other side of", R::Across),
+    (
+        "across the hall from|across the hallway from|across the corridor from|across from|opposite from|opposite to|\
+      opposite of|opposite|facing|face to face with",
+        R::AcrossFrom,
+    ),
+    ("across", R::Across),
+    ("through to|through|in through|via|by way of", R::Through),
+    (
+        "at the very end of|at the far end of|at the other end of|at the opposite end of|at either end of|at both ends of|at the back end of|at the end of|\
+      to the end of|near the end of|by the end of|in the end of|down at the end of|towards the end of|toward the end of",
+        R::AtEndOf,
+    ),
+    (
+        "next door to|next to|beside|alongside|adjacent to|adjoining|right up against|side by side with|attached to|off of|off",
+        R::NextTo,
+    ),
+    ("away from|far away from|far from|a long way from|well away from", R::AwayFrom),
+    (
+        "close to|near to|near|close by|in the vicinity of|not far from|not too far from|a short walk from|\
+      a few steps from|just steps from|around the corner from|by",
+        R::Near,
+    ),
+    ("along", R::Along),
+    (
+        "down the hall from|down the hallway from|down the corridor from|up the hall from|down from|down|up",
+        R::Down,
+    ),
+    ("past|passed|beyond|after|on past|once you pass|just after you pass", R::Past),
+    ("around|round", R::Around),
+    ("out of|outside of|outside", R::OutOf),
+    ("in back of|behind|around the back of|round the back of", R::Behind),
+    ("in between|between", R::Between),
+    ("on the way to|en route to|towards|toward|in the direction of", R::Towards),
+    ("on top of|above|over", R::Above),
+    ("underneath|below|beneath|under", R::Below),
+    ("to the north of|on the north side of|at the north end of|north of", R::NorthOf),
+    ("to the south of|on the south side of|at the south end of|south of", R::SouthOf),
+    ("to the east of|on the east side of|at the east end of|east of", R::EastOf),
+    ("to the west of|on the west side of|at the west end of|west of", R::WestOf),
+    ("upstairs from", R::LevelUp),
+    ("downstairs from", R::LevelDown),
+    ("at the top of|at the bottom of|at the foot of|at the head of|at the corner of|at the base of", R::At),
+    (
+        "in the middle of|in the center of|in the centre of|at the center of|at the back of|in the back of|in the corner of",
+        R::In,
+    ),
+    ("inside of|inside|within|into|in", R::In),
+    ("at", R::At),
+    ("on", R::On),
+    ("that lead to|that leads to|which leads to|leading to|leading into|that goes to|going to|to", R::To),
+    (
+        "where we keep|where they keep|where you keep|where i keep|with|that has|that have|which has|containing|holding",
+        R::Contains,
+    ),
+    ("left of", R::LeftOf),
+    ("right of", R::RightOf),
+];
+/// Says nothing that we use.
+const ADVERBS: &str = "located|situated|found|placed|all the way|way|back|out|over|up|further|farther|a bit|a little|\
+    somewhere|still|also|both|all|tucked away|somewhere over|hidden|immediately adjacent|very|really|pretty|quite|\
+    straight|not far|standing";
+
+impl Cursor<'_> {
+    /// Reads how something lies; none, and the position unchanged, if nothing says so here.
+    pub(super) fn related(&mut self) -> Option<Related> {
+        let start = *self;
+        let found = self.special().or_else(|| {
+            *self = start;
+            self.modified()
+        });
+        if found.is_none() {
+            *self = start;
+        }
+        found
+    }
+
+    /// Phrases with a landmark of their own, most of them without a noun.
+    fn special(&mut self) -> Option<Related> {
+        let start = *self;
+        for read in [
+            Self::same_spot,
+            Self::side,
+            Self::ahead,
+            Self::level,
+            Self::doors,
+            Self::elsewhere,
+            Self::far_side,
+        ] {
+            if let Some(found) = read(self) {
+                return Some(found);
+            }
+            *self = start;
+        }
+        None
+    }
+
+    /// Adverbs and a distance, then a preposition or a special phrase.
+    fn modified(&mut self) -> Option<Related> {
+        let mut modifiers = Modifiers::default();
+        loop {
+            if self.sees("right of|up the|over the|out of|up here") {
+                break;
+            }
+            if self.eat_any("just|right|directly|immediately|straight").is_some() {
+                modifiers.just |= matches!(self.before(), "just" | "right" | "directly" | "immediately");
+            } else if let Some(distance) = self.distance() {
+                modifiers.distance = Some(distance);
+                self.skip("further|farther|or so");
+                let here = self.at_break() || self.sees("on the|on your|to the left|to the right");
+                if self.eat("from") {
+                    return self.with_landmark(R::AwayFrom, modifiers);
+                }
+                if self.eat_any("away|off").is_some() || here {
+                    let from = if self.eat("from") { self.landmark()?.0 } else { Phrase::new(Head::Here) };
+                    return Some(Related { modifiers, ..Related::to(R::AwayFrom, from) });
+                }
+            } else if self.eat_any(ADVERBS).is_none() {
+                break;
+            }
+        }
+        if let Some(found) = self.special() {
+            return Some(Related { modifiers: merged(modifiers, found.modifiers), ..found });
+        }
+        let relation =
+            PREPOSITIONS.iter().find(|(words, _)| self.eat_any(words).is_some()).map(|(_, r)| *r)?;
+        self.with_landmark(relation, modifiers)
+    }
+
+    fn with_landmark(&mut self, relation: Relation, modifiers: Modifiers) -> Option<Related> {
+        if relation == R::Contains {
+            let thing =
+                self.noun_phrase().filter(|t| t.kind != Kind::No || t.determiner != Determiner::Definite)?;
+            return Some(Related { modifiers, ..Related::to(relation, thing.phrase) });
+        }
+        let indefinite =
+            self.sees("a|an|some|another") || (self.peek(0).ends_with('s') && self.peek(0) != "this");
+        let (first, mut sure) = self.landmark()?;
+        if relation == R::On && !sure && matches!(first.head, Head::Named(_)) {
+            // "On the table" is where things are, not places.
+            return None;
+        }
+        let here = matches!(first.head, Head::Here | Head::There);
+        // One is near or away from here; "down here" says nothing of the kind.
+        let pointless = here
+            && !matches!(
+                relation,
+                R::Near
+                    | R::AwayFrom
+                    | R::NextTo
+                    | R::Past
+                    | R::Across
+                    | R::At
+                    | R::NorthOf
+                    | R::SouthOf
+                    | R::EastOf
+                    | R::WestOf
+            );
+        let upward = matches!(first.head, Head::Agent | Head::Speaker)
+            && !matches!(
+                relation,
+                R::Behind | R::InFrontOf | R::AcrossFrom | R::Above | R::Below | R::Near | R::NextTo
+            );
+        if pointless || upward {
+            return None;
+        }
+        let mut landmarks = vec![first];
+        if relation == R::Between {
+            if self.eat("and") {
+                let (second, also) = self.landmark()?;
+                sure |= also;
+                landmarks.push(second);
+            } else if !landmarks[0].features.plural {
+                return None;
+            }
+        }
+        Some(Related { relation, modifiers, landmarks, sure, definite: !indefinite })
+    }
+
+    /// What something can be located by, and whether it surely is a place.
+    pub(super) fn landmark(&mut self) -> Option<(Phrase, bool)> {
+        if let Some(phrase) = self.pointer() {
+            return Some((phrase, false));
+        }
+        let read = self.noun_phrase()?;
+        let definite = matches!(read.determiner, Determiner::Definite | Determiner::Demonstrative);
+        let fits = match read.kind {
+            Kind::Place => true,
+            Kind::Thing => !matches!(read.determiner, Determiner::None | Determiner::Demonstrative),
+            Kind::Open => definite,
+            Kind::Vague if read.name().is_some_and(|n| n.as_str() == "building") => definite,
+            Kind::Vague => definite && (read.is_told() || read.determiner == Determiner::Demonstrative),
+            Kind::No => false,
+        };
+        fits.then_some((read.phrase, read.kind == Kind::Place))
+    }
+
+    /// "On your left", "to the right of the stairs", "on the left side of the hallway".
+    fn side(&mut self) -> Option<Related> {
+        self.skip("off|over|up|immediately");
+        if let Some(way) = self.eat_any("to the north|to the south|to the east|to the west") {
+            let relation = match way {
+                "to the north" => R::NorthOf,
+                "to the south" => R::SouthOf,
+                "to the east" => R::EastOf,
+                _ => R::WestOf,
+            };
+            return (self.peek(0) != "of").then(|| Related::to(relation, Phrase::new(Head::Here)));
+        }
+        self.eat_any("on|to|at")?;
+        let whose = self.eat_any("the|your|my|our|its")?;
+        let left = self.eat_any("left|right")? == "left";
+        self.skip("hand|side");
+        let (of, along) = if left { (R::LeftOf, R::LeftSide) } else { (R::RightOf, R::RightSide) };
+        if self.eat("of") {
+            let (landmark, sure) = self.landmark()?;
+            // Stairs have a left of their own, a hallway only sides.
+            let way =
+                matches!(&landmark.head, Head::Named(n) if is_way(n.as_str()) && n.as_str() != "stairs");
+            return Some(Related { sure, ..Related::to(if way { along } else { of }, landmark) });
+        }
+        if self.sees("as you|when you|if you|once you") {
+            // "… as you come in" tells which way one goes; the side is of that way.
+            self.to_break();
+        }
+        Some(match whose {
+            "the" => Related::to(along, Phrase::new(Head::Path)),
+            "my" => Related::to(of, Phrase::new(Head::Speaker)),
+            "its" => Related::to(of, Phrase::new(Head::It)),
+            _ => Related::to(of, Phrase::new(Head::Agent)),
+        })
+    }
+
+    /// "… not the right": a side without its preposition.
+    pub(super) fn other_side(&mut self) -> Option<Related> {
+        let whose = self.eat_any("the|your|my")?;
+        let left = self.eat_any("left|right")? == "left";
+        let (of, along) = if left { (R::LeftOf, R::LeftSide) } else { (R::RightOf, R::RightSide) };
+        Some(match whose {
+            "the" => Related::to(along, Phrase::new(Head::Path)),
+            "my" => Related::to(of, Phrase::new(Head::Speaker)),
+            _ => Related::to(of, Phrase::new(Head::Agent)),
+        })
+    }
+
+    /// "Straight ahead", "in front of you".
+    fn ahead(&mut self) -> Option<Related> {
+        self.skip("just|right|directly|straight|dead|up");
+        if self.eat_any("in front").is_some() {
+            let of = self.eat_any("of you|of us|of me").unwrap_or("");
+            if of.is_empty() && self.peek(0) == "of" {
+                return None;
+            }
+            return Some(Related::to(R::InFrontOf, Phrase::new(one_of(of))));
+        }
+        let straight = matches!(self.before(), "straight" | "dead");
+        if self.eat("ahead") || (straight && self.eat_any("on|forward").is_some()) {
+            let of = self.eat_any("of you|of us|of me").unwrap_or("");
+            return (self.peek(0) != "of").then(|| Related::to(R::AheadOf, Phrase::new(one_of(of))));
+        }
+        None
+    }
+
+    /// "Next door", "around here", "over there", "around the corner".
+    fn elsewhere(&mut self) -> Option<Related> {
+        let here = || Phrase::new(Head::Here);
+        self.skip("just|right|very|only|pretty|really");
+        let just = self.before() == "just";
+        if self.peek(0) == "next" && self.peek(1) == "door" && self.peek(2) != "to" {
+            self.eat("next door");
+            return Some(Related::to(R::NextTo, here()));
+        }
+        if self
+            .eat_any(
+                "around here|close by|near by|near here|close to here|not far from here|not far away|not far",
+            )
+            .is_some()
+        {
+            return Some(Related::to(R::Near, here()));
+        }
+        if self.eat_any("far away|far from here|a long way off").is_some() && self.at_break() {
+            return Some(Related::to(R::AwayFrom, here()));
+        }
+        if !self.sees("there is|there are|there will|there should")
+            && self.eat_any("over there|there").is_some()
+        {
+            return Some(Related::to(R::At, Phrase::new(Head::There)));
+        }
+        if self.eat_any("around the corner|round the corner|around that corner|around this corner").is_some()
+            && self.peek(0) != "from"
+        {
+            let corner = Phrase::new(Head::Named(Name::new("corner")?));
+            let modifiers = Modifiers { just, ..Modifiers::default() };
+            return Some(Related { modifiers, ..Related::to(R::Around, corner) });
+        }
+        None
+    }
+
+    /// "At the end", "on the other side".
+    fn far_side(&mut self) -> Option<Related> {
+        if self.eat_any("at the very end|at the end|at the far end").is_some() {
+            return (self.peek(0) != "of").then(|| Related::to(R::AtEndOf, Phrase::new(Head::Path)));
+        }
+        self.eat_any("on the other side|across the way")?;
+        (self.peek(0) != "of").then(|| Related::to(R::Across, Phrase::new(Head::Here)))
+    }
+
+    /// "Two doors down from here": the place at the second door.
+    fn doors(&mut self) -> Option<Related> {
+        self.skip("about|just|only");
+        let count = if self.eat_any("a few|several").is_some() {
+            None
+        } else if self.eat_any("a couple of|a couple|a pair of").is_some() {
+            Some(2)
+        } else {
+            let (n, words) = self.number()?;
+            self.advance(words);
+            Some(n as u32)
+        };
+        let noun = match self.eat_any("doors|door|rooms|room|offices|office|buildings|building")? {
+            "door" | "doors" => "door",
+            "room" | "rooms" => "room",
+            "building" | "buildings" => "building",
+            _ => "office",
+        };
+        self.skip("further|farther|more");
+        let from = if self.eat_any("down from|up from|over from|away from|along from|from").is_some() {
+            Related { relation: R::Down, ..Related::to(R::Down, self.landmark()?.0) }
+        } else if self.sees("down the|up the|along the|past|to the left of|to the right of|to the left|to the right|on the left of|before")
+        {
+            self.related()?
+        } else {
+            self.eat_any("down|up|over|along|away|on")?;
+            self.skip("this way|that way");
+            Related::to(R::Down, Phrase::new(Head::Here))
+        };
+        let mut door = Phrase::new(Head::Named(Name::new(noun)?));
+        door.features = Features { count, ..Features::default() };
+        door.within.push(from.restriction());
+        Some(Related::to(R::At, door))
+    }
+
+    /// "About twenty meters".
+    pub(super) fn distance(&mut self) -> Option<Distance> {
+        let start = *self;
+        self.skip("about|approximately|around|roughly|maybe|like|nearly|almost|some|probably|another|only|just|perhaps");
+        let found = self.number().and_then(|(value, words)| {
+            self.advance(words);
+            let unit = match self
+                .eat_any("meters|metres|meter|metre|m|feet|foot|ft|yards|yard|yd|steps|step|paces|pace")?
+            {
+                "meters" | "metres" | "meter" | "metre" | "m" => Unit::Metre,
+                "feet" | "foot" | "ft" => Unit::Foot,
+                "yards" | "yard" | "yd" => Unit::Yard,
+                _ => Unit::Step,
+            };
+            Some(Distance { value, unit })
+        });
+        if found.is_none() {
+            *self = start;
+        }
+        found
+    }
+
+    /// The number here and how many words it takes.
+    pub(super) fn number(&self) -> Option<(f64, usize)> {
+        let lead = match (self.peek(0), self.peek(1), self.peek(2)) {
+            ("a", "couple", "of") => return Some((2.0, 3)),
+            ("a", "couple", _) => return Some((2.0, 2)),
+            // "A few" is three in most ears.
+            ("a", "few", _) => return Some((3.0, 2)),
+            ("a", "hundred", _) => return Some((100.0, 2)),
+            ("a", "dozen", _) => return Some((12.0, 2)),
+            ("a", ..) => return Some((1.0, 1)),
+            _ => 0,
+        };
+        // A number has at most this many words: "one hundred and twenty five".
+        let words: Vec<String> = (0..5).map(|i| self.peek(lead + i).to_owned()).collect();
+        quantity(&words, 0).map(|(n, end)| (n, end + lead))
+    }
+
+    pub(super) fn advance(&mut self, words: usize) {
+        for _ in 0..words {
+            self.step();
+        }
+    }
+}
+
+fn one_of(of: &str) -> Head {
+    if of == "of me" { Head::Speaker } else { Head::Agent }
+}
+
+fn merged(outer: Modifiers, inner: Modifiers) -> Modifiers {
+    Modifiers {
+        just: outer.just || inner.just,
+        distance: inner.distance.or(outer.distance),
+        count: inner.count.or(outer.count),
+    }
+}
