@@ -185,8 +185,8 @@ impl Belief {
     }
 
     /// Reads from where a clique's numbers lie, so that they are near once it is its turn: each is
-    /// somewhere else in memory, and to wait for one after the other takes about as long as all the
-    /// arithmetic, while here the processor fetches them side by side.
+    /// somewhere else in memory, and much of the time would go into waiting for one after the other,
+    /// while here the processor fetches them side by side.
     fn read_ahead(&self, c: u32, clique: &Clique) {
         let front = self.fronts[c as usize].as_ref().map(|front| front.touched());
         let lists = [&clique.poses, &clique.slots, &clique.children].map(|list| list.first().copied());
