@@ -6,7 +6,7 @@ use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::{Evidence, LabelId, Labels, Source};
 use crate::language::act::{Head, Locate, Parse, Phrase, Restriction};
-use crate::language::{GroundPlace, ground};
+use crate::language::{GroundPlace, ground, ground_by_paper};
 use crate::ledger::Ledger;
 use crate::listen::locates;
 use crate::particle::Particle;
@@ -40,7 +40,7 @@ impl Filter {
         for name in &figures {
             ledger.enter_name(name);
         }
-        let ledger = &self.ledger;
+        let (ledger, by_paper) = (&self.ledger, self.config.paper_language);
         self.particles.par_iter_mut().for_each(|p| {
             let scene = Scene {
                 places: places(&poses(p), path_m),
@@ -48,6 +48,7 @@ impl Filter {
                 ledger,
                 utterance,
                 held: held as usize,
+                by_paper,
             };
             let grounded = scene.grounded(parse);
             p.labels.reground(utterance, &grounded);
@@ -69,6 +70,9 @@ impl Filter {
     }
 
     fn reground_some(&mut self, utterances: &[u32]) {
+        if self.config.paper_language {
+            return;
+        }
         let path_m: Vec<f64> = self.graph.places().iter().map(|p| p.path_m).collect();
         for &utterance in utterances {
             let entry = &self.ledger.entries()[utterance as usize];
@@ -87,6 +91,9 @@ impl Filter {
         poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
         path_m: &[f64],
     ) {
+        if self.config.paper_language {
+            return;
+        }
         let speaks =
             |p: &Phrase| p.label().is_some_and(|name| self.ledger.label(name.as_str()) == Some(label));
         let about = |l: &Locate| speaks(&l.figure) || l.landmarks.iter().any(speaks);
@@ -112,6 +119,7 @@ struct Scene<'a> {
     ledger: &'a Ledger,
     utterance: u32,
     held: usize,
+    by_paper: bool,
 }
 
 impl Scene<'_> {
@@ -141,6 +149,10 @@ impl Scene<'_> {
     /// p(figure is place i | λ), eq. (14).
     fn place_of(&self, l: &Locate, figure: Option<LabelId>) -> Vec<f64> {
         let landmark = l.landmarks.first().map_or_else(Vec::new, |p| self.landmark(p));
+        if self.by_paper {
+            let likeliest = landmark.iter().max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+            return ground_by_paper(l.relation, &self.places, likeliest.map(|l| l.0));
+        }
         let prior = figure.map_or_else(Vec::new, |figure| self.applies(figure));
         ground(l.relation, &self.places, self.held, &landmark, &prior).p
     }
