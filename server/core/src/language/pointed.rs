@@ -218,7 +218,7 @@ pub(super) fn where_kept(at: &mut Cursor) -> Option<Phrase> {
         "eat|drink|meet|work|sleep|cook|park|print|study|relax|rest|hang out|smoke|play|exercise|work out|hold|teach|\
          have|take|make|wash|wait|gather|sit|read|pick up|drop off",
     )?;
-    let rest = at.to_break();
+    let rest = at.take_to_break();
     place.features.purpose = Some([&[verb], rest.as_slice()].concat().join(" "));
     (rest.len() <= 4).then_some(place)
 }

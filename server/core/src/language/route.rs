@@ -33,13 +33,11 @@ pub(super) fn route_clause(at: &mut Cursor) -> Option<Readings> {
         }
         at.skip("please|just|first|then|if you|as you|when you|once you|after you|you have to|you need to|you should|\
              you can|you want to|you will want to|you|immediately");
-        match step(at).filter(|_| steps.len() < STEPS_MAX) {
-            Some(step) => steps.push(step),
-            None => {
-                *at = start;
-                break;
-            }
-        }
+        let Some(step) = step(at).filter(|_| steps.len() < STEPS_MAX) else {
+            *at = start;
+            break;
+        };
+        steps.push(step);
     }
     if steps.is_empty() {
         return None;

@@ -145,9 +145,12 @@ impl Lead {
     }
 }
 
+/// A way to read a clause.
+type Form<'f> = &'f dyn Fn(&mut Cursor) -> Option<Readings>;
+
 fn clause(at: &mut Cursor, question: bool) -> Option<Readings> {
     let start = *at;
-    let forms: [&dyn Fn(&mut Cursor) -> Option<Readings>; 6] = [
+    let forms: [Form; 6] = [
         &|at| ask_clause(at, question),
         &renaming,
         &label_clause,
