@@ -1,8 +1,9 @@
-//! The planner's role: asks where things are. Questions change nothing.
+//! The planner's role: asks where things are, and mends what was said. Questions change nothing.
 
 use crate::session::{ClientError, ask};
 use std::time::Duration;
-use toponym_proto::answer::{Done, GraphReply, GridReply, Info, LabelsReply, WhereReply};
+use toponym_proto::Mend;
+use toponym_proto::answer::{Done, GraphReply, GridReply, Info, LabelsReply, Mended, WhereReply};
 use toponym_proto::keys::{Ask, Keys, check_id};
 use toponym_proto::selector;
 use zenoh::Session;
@@ -55,6 +56,19 @@ impl Planner {
     pub async fn save(&self) -> Result<Done, ClientError> {
         let arguments = selector::encode([("map", self.map.as_str())]);
         ask(&self.session, &self.keys.command("save"), &arguments, self.timeout).await
+    }
+
+    /// Mends what was said: takes a sentence back, as if it had never been said; gives a name its right
+    /// spelling; forgets a name. Refused where there is nothing of the kind.
+    pub async fn mend(&self, mend: &Mend) -> Result<Mended, ClientError> {
+        let (command, mut arguments) = match mend {
+            Mend::Undo { id } => ("undo", id.iter().map(|id| ("id", id.as_str())).collect()),
+            Mend::Rename { from, to } => ("rename", vec![("from", from.as_str()), ("to", to)]),
+            Mend::Forget { name } => ("forget", vec![("name", name.as_str())]),
+        };
+        arguments.push(("map", &self.map));
+        let arguments = selector::encode(arguments);
+        ask(&self.session, &self.keys.command(command), &arguments, self.timeout).await
     }
 
     /// The server's maps and robots.

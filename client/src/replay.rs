@@ -104,7 +104,7 @@ impl Replay {
                 sleep_until(begin + Duration::try_from_secs_f64(log_s / speed).unwrap_or_default()).await;
             }
             ended = matches!(record.message, Message::End(_));
-            player.play(record, self.map.as_deref()).await?;
+            player.play(record, self.map.as_deref(), session, &self.robot.site).await?;
             player.hear();
             let in_flight = player.robot.in_flight();
             (player.tell)(Progress::Sent { bytes: log.progress(), log_s, in_flight });
@@ -118,7 +118,13 @@ impl Replay {
 }
 
 impl Player<'_> {
-    async fn play(&mut self, record: LogRecord, map: Option<&str>) -> Result<(), ClientError> {
+    async fn play(
+        &mut self,
+        record: LogRecord,
+        map: Option<&str>,
+        session: &Session,
+        site: &str,
+    ) -> Result<(), ClientError> {
         match record.message {
             Message::Say(say) => {
                 // The log's robot may play under another name.
@@ -126,6 +132,12 @@ impl Player<'_> {
                 self.guide.publish(&say).await?;
                 self.done.sentences += 1;
                 self.waiting.insert(say.id, say.text);
+            }
+            Message::Mend(mend) => {
+                let planner = Planner::new(session, site, &self.done.map, FILTER_WAIT)?;
+                if let Err(e) = planner.mend(&mend).await {
+                    warn!("{mend:?} was not done: {e}");
+                }
             }
             mut message => {
                 if let Message::Setup(setup) = &mut message {

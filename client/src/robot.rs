@@ -219,7 +219,7 @@ impl Robot {
             Message::Scan(scan) => self.keys.scan(robot, &scan.laser),
             Message::Odom(_) => self.keys.odom(robot),
             Message::End(_) => self.keys.end(robot),
-            Message::Setup(_) | Message::Say(_) => self.keys.setup(robot),
+            Message::Setup(_) | Message::Say(_) | Message::Mend(_) => self.keys.setup(robot),
         };
         let bytes = match self.config.form {
             Form::Bincode => message.to_bincode(),
@@ -359,6 +359,6 @@ fn header_mut(message: &mut Message) -> Option<&mut Header> {
         Message::Odom(m) => Some(&mut m.header),
         Message::Scan(m) => Some(&mut m.header),
         Message::End(m) => Some(&mut m.header),
-        Message::Say(_) => None,
+        Message::Say(_) | Message::Mend(_) => None,
     }
 }

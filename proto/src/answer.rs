@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::feedback::{
-    Ack, Counts, Done, Grounded, Heard, HeardStatus, Info, Jump, PoseOut, PoseState, RobotState,
+    Ack, Counts, Done, Grounded, Heard, HeardStatus, Info, Jump, Mended, PoseOut, PoseState, RobotState,
 };
 
 /// `v` of every answer.
@@ -149,7 +149,7 @@ pub struct LabelEntry {
 }
 
 /// Answer of `ask/graph`, and what is published on `out/graph`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct GraphReply {
     /// [`ANSWER_VERSION`].
     pub v: u32,
@@ -166,7 +166,7 @@ pub struct GraphReply {
 }
 
 /// A vertex of the best graph.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Place {
     /// Its id.
     pub id: u64,
@@ -301,6 +301,8 @@ pub enum ErrorCode {
     NotLocalised,
     /// The map is another robot's.
     MapTaken,
+    /// No such sentence or name.
+    NothingToMend,
     /// This server can't do it yet.
     Unsupported,
     /// The server's fault.

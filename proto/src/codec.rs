@@ -47,6 +47,7 @@ impl Message {
             Self::Scan(_) => 3,
             Self::Say(_) => 4,
             Self::End(_) => 5,
+            Self::Mend(_) => 6,
         }
     }
 
@@ -59,6 +60,7 @@ impl Message {
             Self::Scan(m) => append(&mut bytes, m),
             Self::Say(m) => append(&mut bytes, m),
             Self::End(m) => append(&mut bytes, m),
+            Self::Mend(m) => append(&mut bytes, m),
         }?;
         Ok(bytes)
     }
@@ -71,6 +73,7 @@ impl Message {
             Self::Scan(m) => serde_json::to_vec(m),
             Self::Say(m) => serde_json::to_vec(m),
             Self::End(m) => serde_json::to_vec(m),
+            Self::Mend(m) => serde_json::to_vec(m),
         }
         .map_err(|e| Refused::Malformed(e.to_string()))
     }
@@ -84,6 +87,7 @@ impl Message {
             [VERSION, 3, body @ ..] => Self::Scan(parse(body)?),
             [VERSION, 4, body @ ..] => Self::Say(parse(body)?),
             [VERSION, 5, body @ ..] => Self::End(parse(body)?),
+            [VERSION, 6, body @ ..] => Self::Mend(parse(body)?),
             [VERSION, id, ..] => return Err(Refused::Malformed(format!("unknown type id {id}"))),
             [version, _, ..] => {
                 return Err(Refused::Malformed(format!("version {version}, this build reads {VERSION}")));
@@ -243,6 +247,7 @@ mod tests {
             Message::Scan(s) => Input::Scan { laser: s.laser.clone() },
             Message::Say(_) => Input::Say,
             Message::End(_) => Input::End,
+            Message::Mend(_) => unreachable!("has no key"),
         }
     }
 
@@ -256,6 +261,20 @@ mod tests {
             let json = m.to_json().unwrap();
             prop_assert_eq!(&Message::decode(&input_of(&m), ENCODING_JSON, &json, &limits).unwrap(), &m);
             prop_assert_eq!(&Message::decode(&input_of(&m), "zenoh/bytes", &json, &limits).unwrap(), &m);
+        }
+
+        #[test]
+        fn what_is_mended_survives_a_record(text in "[a-z ]{0,9}x", how in 0..3) {
+            use crate::stream::Mend;
+            let m = Message::Mend(match how {
+                0 => Mend::Undo { id: Some(text) },
+                1 => Mend::Rename { from: text, to: "gym".into() },
+                _ => Mend::Forget { name: text },
+            });
+            let bytes = m.to_bincode().unwrap();
+            prop_assert_eq!(&Message::from_bincode(&bytes, &Limits::default()).unwrap(), &m);
+            // It comes by a query, on no stream's key.
+            prop_assert!(Message::decode(&Input::Say, ENCODING_BINCODE, &bytes, &Limits::default()).is_err());
         }
 
         #[test]

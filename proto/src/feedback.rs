@@ -165,3 +165,18 @@ pub struct Done {
     /// The maps it concerned.
     pub maps: Vec<String>,
 }
+
+/// Answer of `do/undo`, `do/rename`, `do/forget`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Mended {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// The command.
+    pub query: String,
+    /// The map.
+    pub map: String,
+    /// What was done.
+    pub words: String,
+    /// Whether it is on disk, and will outlive the server.
+    pub durable: bool,
+}

@@ -25,5 +25,5 @@ mod wire;
 
 pub use codec::Refused;
 pub use keys::Keys;
-pub use stream::{Clock, End, Header, Hearing, Laser, Message, Odom, Pose, Say, Scan, Setup, Stamp};
+pub use stream::{Clock, End, Header, Hearing, Laser, Mend, Message, Odom, Pose, Say, Scan, Setup, Stamp};
 pub use validate::{Invalid, Limits};

@@ -156,6 +156,29 @@ pub struct Hearing {
     pub p: f64,
 }
 
+/// What an operator mends at a desk, by the queries `do/undo`, `do/rename` and `do/forget`.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Mend {
+    /// Takes a sentence back.
+    Undo {
+        /// Its id; the newest that stands if none is given.
+        id: Option<String>,
+    },
+    /// From now on a name means another one.
+    Rename {
+        /// The wrong name.
+        from: String,
+        /// The right one.
+        to: String,
+    },
+    /// Nothing said so far speaks of this name any more.
+    Forget {
+        /// The name.
+        name: String,
+    },
+}
+
 /// Anything a mapper listens to; also the record of `serve --record` files.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "type", rename_all = "lowercase")]
@@ -170,17 +193,19 @@ pub enum Message {
     Say(Say),
     /// The robot's stream ends.
     End(End),
+    /// An operator mends what was said.
+    Mend(Mend),
 }
 
 impl Message {
-    /// The header of a robot's message; a sentence has none.
+    /// The header of a robot's message; what people say and mend has none.
     pub fn header(&self) -> Option<&Header> {
         match self {
             Self::Setup(m) => Some(&m.header),
             Self::Odom(m) => Some(&m.header),
             Self::Scan(m) => Some(&m.header),
             Self::End(m) => Some(&m.header),
-            Self::Say(_) => None,
+            Self::Say(_) | Self::Mend(_) => None,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Limits, and the only place that rejects.
 
 use crate::keys::{ANY_ROBOT, check_id};
-use crate::stream::{Header, Laser, Message, Pose, Say, Scan, Setup, Stamp};
+use crate::stream::{Header, Laser, Mend, Message, Pose, Say, Scan, Setup, Stamp};
 use serde::{Deserialize, Serialize};
 
 /// Why a value is refused.
@@ -77,6 +77,7 @@ impl Message {
             Self::Scan(m) => check_scan(m, limits),
             Self::Say(m) => check_say(m, limits),
             Self::End(_) => Ok(()),
+            Self::Mend(m) => check_mend(m, limits),
         }
     }
 }
@@ -196,6 +197,17 @@ fn check_say(say: &Say, limits: &Limits) -> Result<(), Invalid> {
         return Err(Invalid::new("ended", "is before began"));
     }
     Ok(())
+}
+
+fn check_mend(mend: &Mend, limits: &Limits) -> Result<(), Invalid> {
+    match mend {
+        Mend::Undo { id } => id.iter().try_for_each(|id| check_token("id", id)),
+        Mend::Rename { from, to } => {
+            check_text("from", from, limits)?;
+            check_text("to", to, limits)
+        }
+        Mend::Forget { name } => check_text("name", name, limits),
+    }
 }
 
 fn check_token(field: &str, token: &str) -> Result<(), Invalid> {

@@ -11,7 +11,7 @@ use toponym_proto::answer::{
     ANSWER_VERSION, Candidate, Edge, FromRobot, Goal, GraphReply, GridReply, Grounded, Heard, HeardStatus,
     LabelEntry, LabelsReply, MapIdentity, Particle, Place, PoseState, Reachable, Resolved, WhereReply,
 };
-use toponym_proto::{Message, Pose, Stamp};
+use toponym_proto::{Mend, Message, Pose, Stamp};
 
 /// A message as the core takes it. A sentence without `began` counts as said at the clock's zero:
 /// the merge has filled it in before.
@@ -45,9 +45,15 @@ pub fn event(message: Message) -> Event {
                 speaker: m.speaker,
                 began_ns: began.ns,
                 ended_ns: m.ended.unwrap_or(began).ns,
+                retracts: m.retracts,
             })
         }
         Message::End(_) => Event::Flush,
+        Message::Mend(m) => Event::Command(match m {
+            Mend::Undo { id } => event::Command::Undo { utterance: id },
+            Mend::Rename { from, to } => event::Command::Rename { from, to },
+            Mend::Forget { name } => event::Command::Forget { name },
+        }),
     }
 }
 

@@ -1,8 +1,13 @@
 //! Every query gets a reply, whatever is asked and whenever.
 
-use crate::site::{Folder, Site, drive, settings};
-use toponym_proto::answer::{ErrorCode, GraphReply, GridReply, Info, LabelsReply, PoseOut, WhereReply};
+use crate::site::{Folder, Site, drive, recorded, say, settings};
+use toponym_core::Mapper;
+use toponym_proto::Message;
+use toponym_proto::answer::{
+    ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, WhereReply,
+};
 use toponym_proto::keys::Ask;
+use toponym_server::convert;
 
 async fn mapped(folder: &Folder) -> Site {
     let site = Site::start(settings(folder)).await;
@@ -51,6 +56,45 @@ async fn a_map_answers() {
 }
 
 #[tokio::test(flavor = "multi_thread")]
+async fn what_was_said_is_mended_and_a_replay_mends_it_too() {
+    let folder = Folder::new();
+    let record = folder.0.join("record");
+    let config = settings(&folder);
+    let site = Site::start_recording(config.clone(), Some(&record)).await;
+    let (acks, heard) = (site.acks("r1").await, site.listen(site.keys.heard("r1")).await);
+    for message in &drive("r1", "main") {
+        site.send(message).await;
+    }
+    acks.ack_of(81).await;
+    for (id, text) in [("s1", "this is the jim"), ("s2", "this is the lounge"), ("s3", "this is the kitchen")]
+    {
+        site.send_json(&Message::Say(say(None, id, text, None))).await;
+        heard.heard(id).await;
+    }
+    for (command, arguments, words) in [
+        ("undo", "", "I took back: \"this is the kitchen\"."),
+        ("undo", "id=s2;map=main", "I took back: \"this is the lounge\"."),
+        ("rename", "from=jim;to=gym", "What was the jim is the gym now."),
+    ] {
+        let selector = format!("{}?{arguments}", site.keys.command(command));
+        let mended: Mended = serde_json::from_value(site.ask(&selector, "").await.unwrap()).unwrap();
+        assert_eq!((mended.words.as_str(), mended.durable), (words, true));
+    }
+    let nothing = site.ask(&format!("{}?name=attic", site.keys.command("forget")), "").await.unwrap_err();
+    assert_eq!(nothing.code, ErrorCode::NothingToMend);
+    let json = site.ask(&site.keys.ask("main", Ask::Labels), "").await.unwrap();
+    let labels: LabelsReply = serde_json::from_value(json).unwrap();
+    assert_eq!(labels.labels.iter().map(|l| l.label.as_str()).collect::<Vec<_>>(), ["gym"]);
+    site.stop().await;
+
+    let mut mapper = Mapper::new(config.mapper);
+    for message in recorded(&record) {
+        mapper.step(convert::event(message));
+    }
+    assert!(mapper.save().unwrap() == std::fs::read(folder.0.join("data/main.map")).unwrap());
+}
+
+#[tokio::test(flavor = "multi_thread")]
 async fn who_comes_late_gets_the_newest() {
     let folder = Folder::new();
     let site = mapped(&folder).await;
@@ -88,6 +132,9 @@ async fn every_wrong_question_gets_an_error() {
         (keys.ask("main", Ask::Grid) + "?resolution_m=0", "", ErrorCode::BadArgument, "resolution_m"),
         (keys.command("explode"), "", ErrorCode::Unsupported, "key"),
         (keys.command("save") + "?map=attic", "", ErrorCode::NoSuchMap, "map"),
+        (keys.command("undo") + "?map=attic", "", ErrorCode::NoSuchMap, "map"),
+        (keys.command("rename") + "?from=gym", "", ErrorCode::BadArgument, "to"),
+        (keys.command("forget") + "?name=", "", ErrorCode::BadArgument, "name"),
         ("toponym/v1/default/map/main/ask/why".into(), "", ErrorCode::NoSuchQuery, "key"),
         ("toponym/v1/default/nothing/*".into(), "", ErrorCode::NoSuchQuery, "key"),
     ];

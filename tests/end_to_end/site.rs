@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
 use toponym_proto::answer::{Ack, ErrorReply, Heard, Problem, RobotState};
 use toponym_proto::codec::{ENCODING_BINCODE, ENCODING_JSON};
+use toponym_proto::record::RecordReader;
 use toponym_proto::{Clock, End, Header, Keys, Laser, Message, Odom, Pose, Say, Scan, Setup, Stamp};
 use toponym_server::config::ServerConfig;
 use toponym_server::serve::Server;
@@ -94,6 +95,7 @@ impl Site {
             Message::Scan(m) => self.keys.scan(&m.header.robot, &m.laser),
             Message::End(m) => self.keys.end(&m.header.robot),
             Message::Say(m) => self.keys.say(m.robot.as_deref()),
+            Message::Mend(_) => self.keys.command("undo"),
         }
     }
 
@@ -165,6 +167,12 @@ impl Listener {
     pub async fn heard(&self, id: &str) -> Heard {
         self.until(|heard: &Heard| heard.id == id).await
     }
+}
+
+/// The messages of a record file.
+pub fn recorded(path: &Path) -> Vec<Message> {
+    let reader = RecordReader::new(std::fs::File::open(path).unwrap()).unwrap();
+    reader.map(|m| m.unwrap().1).collect()
 }
 
 /// The streams of a robot that drives through a hall of 12 m by 6 m, from its setup to its end.

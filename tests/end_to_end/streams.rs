@@ -1,17 +1,11 @@
 //! What robots send, in whatever order and state it arrives.
 
-use crate::site::{Folder, Site, connect, drive, header, odom, say, settings, setup};
+use crate::site::{Folder, Site, connect, drive, header, odom, recorded, say, settings, setup};
 use toponym_core::Mapper;
 use toponym_proto::answer::{ErrorCode, HeardStatus};
 use toponym_proto::merge::{Sentences, order_stamp};
-use toponym_proto::record::RecordReader;
 use toponym_proto::{Message, Stamp};
 use toponym_server::convert;
-
-fn read_record(path: &std::path::Path) -> Vec<Message> {
-    let reader = RecordReader::new(std::fs::File::open(path).unwrap()).unwrap();
-    reader.map(|m| m.unwrap().1).collect()
-}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn garbage_on_a_key_is_told_and_the_stream_goes_on() {
@@ -43,7 +37,7 @@ async fn json_takes_the_same_way_as_bincode() {
     }
     acks.ack_of(81).await;
     site.stop().await;
-    let (scan, taken) = (&stream[2], &read_record(&record)[2]);
+    let (scan, taken) = (&stream[2], &recorded(&record)[2]);
     assert_eq!(format!("{taken:?}"), format!("{scan:?}"));
 }
 
@@ -64,7 +58,7 @@ async fn overtaken_and_repeated_messages_come_out_in_order() {
     let repeated = stream.chunks(4).count() as u64;
     states.state(|s| s.counts.repeated == repeated && s.counts.lost == 0).await;
     site.stop().await;
-    assert_eq!(read_record(&record), stream);
+    assert_eq!(recorded(&record), stream);
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -165,7 +159,7 @@ async fn a_recorded_run_replays_to_the_same_map() {
         offline.extend(std::iter::from_fn(|| sentences.pop_before(order_stamp(&message))).map(Message::Say));
         offline.push(message);
     }
-    let recorded = read_record(&record);
+    let recorded = recorded(&record);
     assert_eq!(recorded, offline);
 
     let mut mapper = Mapper::new(config.mapper);
@@ -193,10 +187,10 @@ async fn sentences_that_cannot_be_used_are_answered() {
     // The only robot need not be named.
     site.send_json(&Message::Say(say(None, "s2", "this is the gym", None))).await;
     assert_ne!(heard.heard("s2").await.status, HeardStatus::Refused);
-    let mut back = say(Some("r1"), "s3", "no it is not", None);
+    let mut back = say(Some("r1"), "s3", "this is the lounge", None);
     back.retracts = Some("s2".into());
     site.send_json(&Message::Say(back)).await;
-    assert_eq!(heard.heard("s3").await.error.unwrap().code, ErrorCode::Unsupported);
+    assert!(heard.heard("s3").await.words.contains("I took back: \"this is the gym\""));
 
     let acks = site.acks("r2").await;
     site.send(&setup("r2", "annex")).await;

@@ -1,6 +1,7 @@
 //! The command line: arguments, exit codes, and one function per command.
 
 mod find;
+mod mend;
 mod play;
 mod talk;
 
@@ -64,6 +65,12 @@ enum Command {
     Where(find::WhereArgs),
     /// List all names taught so far.
     Labels(find::LabelsArgs),
+    /// Take a sentence back.
+    Undo(mend::UndoArgs),
+    /// Give a misheard name its right spelling.
+    Rename(mend::RenameArgs),
+    /// Forget a name.
+    Forget(mend::ForgetArgs),
     /// Play a recorded log to the server, as robot and guide.
     Replay(play::ReplayArgs),
     Simulate(SimulateArgs),
@@ -110,6 +117,9 @@ pub async fn run(args: Args) -> ExitCode {
         Command::Say(say) => talk::say(&endpoint, &args.site, say).await,
         Command::Where(asked) => find::find(&endpoint, &args.site, asked).await,
         Command::Labels(asked) => find::labels(&endpoint, &args.site, asked).await,
+        Command::Undo(undo) => mend::undo(&endpoint, &args.site, undo).await,
+        Command::Rename(rename) => mend::rename(&endpoint, &args.site, rename).await,
+        Command::Forget(forget) => mend::forget(&endpoint, &args.site, forget).await,
         Command::Replay(replay) => play::replay(&endpoint, &args.site, replay).await,
         Command::Simulate(simulate) => simulated(simulate),
     };

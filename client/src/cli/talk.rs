@@ -1,9 +1,10 @@
 //! `toponym say`.
 
 use super::{Failure, exit};
+use std::fmt::Write as _;
 use std::time::Duration;
-use toponym::Guide;
-use toponym_proto::answer::HeardStatus;
+use toponym::{Guide, Planner};
+use toponym_proto::answer::{GraphReply, Heard, HeardStatus};
 
 /// Arguments of `say`.
 #[derive(Debug, clap::Args)]
@@ -11,6 +12,7 @@ use toponym_proto::answer::HeardStatus;
 Examples:
   toponym say 'this is the gym'
   toponym say 'the library is down the hall' --robot r07 --speaker anna
+  toponym say 'the lab is past the stairs' --explain
 
 It speaks of the place where the robot is now. Exit code 1 if it was not understood.")]
 pub struct SayArgs {
@@ -22,6 +24,12 @@ pub struct SayArgs {
     /// Who says it.
     #[arg(long)]
     speaker: Option<String>,
+    /// Tell how the sentence was read and where it was put.
+    #[arg(long)]
+    explain: bool,
+    /// The map for --explain.
+    #[arg(long, default_value = "main")]
+    map: String,
     /// How long to wait for the robot's answer.
     #[arg(long, value_name = "S", default_value = "10", value_parser = super::seconds)]
     timeout: Duration,
@@ -33,9 +41,54 @@ pub async fn say(endpoint: &str, site: &str, args: &SayArgs) -> Result<u8, Failu
     guide.speaker.clone_from(&args.speaker);
     let heard = guide.say(&args.text, args.timeout).await?;
     println!("{}", heard.words);
+    if args.explain {
+        let planner = Planner::new(&session, site, &args.map, args.timeout)?;
+        print!("{}", explained(&heard, &planner.graph().await?));
+    }
     Ok(match heard.status {
         HeardStatus::Understood => exit::FOUND,
         HeardStatus::NotUnderstood => exit::NOT_KNOWN,
         HeardStatus::Refused => exit::REFUSED,
     })
+}
+
+/// How a sentence was read and where it was put, with its id to take it back by.
+fn explained(heard: &Heard, graph: &GraphReply) -> String {
+    let mut text = format!("sentence  {}\nread as   {}\n", heard.id, heard.parse);
+    for grounded in &heard.grounded {
+        let place = graph.places.iter().find(|p| p.id == grounded.place);
+        let at = place.map_or(String::new(), |p| format!(" (x {:.2} m, y {:.2} m)", p.x_m, p.y_m));
+        let _ = writeln!(text, "put at    place {}{at}: {:.2}", grounded.place, grounded.p);
+    }
+    let elsewhere = 1.0 - heard.grounded.iter().map(|g| g.p).sum::<f64>();
+    if heard.status == HeardStatus::Understood && elsewhere > 0.005 {
+        let _ = writeln!(text, "          elsewhere or not seen yet: {elsewhere:.2}");
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use toponym_proto::answer::{Grounded, Place};
+
+    #[test]
+    fn a_sentence_is_explained() {
+        let heard = Heard {
+            id: "01J".into(),
+            status: HeardStatus::Understood,
+            durable: true,
+            parse: "loc(lab,past,stairs)".into(),
+            grounded: vec![Grounded { place: 7, p: 0.6 }],
+            words: String::new(),
+            error: None,
+        };
+        let place = Place { id: 7, x_m: 1.0, y_m: -2.0, ..Place::default() };
+        let graph = GraphReply { places: vec![place], ..GraphReply::default() };
+        assert_eq!(
+            explained(&heard, &graph),
+            "sentence  01J\nread as   loc(lab,past,stairs)\nput at    place 7 (x 1.00 m, y -2.00 m): 0.60\n\
+             \x20         elsewhere or not seen yet: 0.40\n"
+        );
+    }
 }

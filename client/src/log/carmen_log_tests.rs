@@ -29,6 +29,7 @@ fn kinds(records: &[LogRecord]) -> String {
             (Message::Scan(_), _) => 'L',
             (Message::Say(_), _) => 'U',
             (Message::End(_), _) => 'E',
+            (Message::Mend(_), _) => 'M',
         })
         .collect()
 }

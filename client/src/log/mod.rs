@@ -99,7 +99,7 @@ impl Notes {
 
     fn count(&mut self, message: &Message) {
         match message {
-            Message::Setup(_) | Message::End(_) => {}
+            Message::Setup(_) | Message::End(_) | Message::Mend(_) => {}
             Message::Odom(_) => self.odoms += 1,
             Message::Scan(_) => self.scans += 1,
             Message::Say(_) => self.sentences += 1,

@@ -73,6 +73,7 @@ struct Fields {
     lang: Option<String>,
     #[serde(default)]
     alternatives: Vec<Hearing>,
+    retracts: Option<String>,
 }
 
 impl Narration {
@@ -141,7 +142,7 @@ fn sentence(line: usize, text: &str) -> Result<Sentence, String> {
         speaker: fields.speaker,
         began: None,
         ended: None,
-        retracts: None,
+        retracts: fields.retracts,
     };
     Ok(Sentence { began, say })
 }
@@ -227,6 +228,7 @@ mod tests {
                 Message::Scan(_) => "L".to_owned(),
                 Message::Say(say) => say.text,
                 Message::End(_) => "E".to_owned(),
+                Message::Mend(_) => "M".to_owned(),
             })
             .collect()
     }

@@ -234,7 +234,7 @@ fn header_mut(message: &mut Message) -> Option<&mut Header> {
         Message::Odom(m) => Some(&mut m.header),
         Message::Scan(m) => Some(&mut m.header),
         Message::End(m) => Some(&mut m.header),
-        Message::Say(_) => None,
+        Message::Say(_) | Message::Mend(_) => None,
     }
 }
 

@@ -62,7 +62,7 @@ pub fn fits_carmen(recording: &Recording) -> bool {
             let half_circle = (scan.angle_min_rad + FRAC_PI_2).abs().max((last_rad - FRAC_PI_2).abs());
             scan.time_increment_s == 0.0 && half_circle < 1e-6
         }
-        Message::Odom(_) | Message::Say(_) | Message::End(_) => true,
+        Message::Odom(_) | Message::Say(_) | Message::End(_) | Message::Mend(_) => true,
     })
 }
 
@@ -91,7 +91,7 @@ pub fn carmen(recording: &Recording) -> String {
             Message::Scan(scan) if front.as_ref() == Some(&scan.laser) => {
                 flaser(&mut text, scan, &odom, offset_m);
             }
-            Message::Scan(_) | Message::Say(_) | Message::End(_) => {}
+            Message::Scan(_) | Message::Say(_) | Message::End(_) | Message::Mend(_) => {}
         }
     }
     text

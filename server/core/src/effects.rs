@@ -136,6 +136,8 @@ pub enum Effect {
     },
     /// A sentence was dealt with.
     Heard(Heard),
+    /// An operator's command was carried out, or why not: in words.
+    Mended(Result<String, String>),
     /// A place is in the graph of every particle: the last effect of its step.
     Weighed {
         /// The place.

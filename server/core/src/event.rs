@@ -18,6 +18,8 @@ pub enum Event {
     Scan(Scan),
     /// A guide's sentence.
     Utterance(Utterance),
+    /// What an operator mends.
+    Command(Command),
     /// The stream ended: nothing is waited for any more, all places freeze.
     Flush,
 }
@@ -96,4 +98,28 @@ pub struct Utterance {
     pub began_ns: StampNs,
     /// When it ended.
     pub ended_ns: StampNs,
+    /// Id of a sentence that this one takes back.
+    pub retracts: Option<String>,
+}
+
+/// What an operator mends at a desk.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Command {
+    /// Takes a sentence back.
+    Undo {
+        /// Its id; the newest that stands if none is given.
+        utterance: Option<String>,
+    },
+    /// A name was misheard or misspelt: from now on it means another one.
+    Rename {
+        /// The wrong name.
+        from: String,
+        /// The right one.
+        to: String,
+    },
+    /// Nothing said so far speaks of this name any more.
+    Forget {
+        /// The name.
+        name: String,
+    },
 }

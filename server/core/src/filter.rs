@@ -8,7 +8,7 @@ use crate::effects::{Effect, Effects};
 use crate::geometry::Pose2;
 use crate::graph::{Graph, Vertex};
 use crate::inject::inject;
-use crate::listen::Ledger;
+use crate::ledger::Ledger;
 use crate::loops::{Fit, Loops, Measured};
 use crate::particle::Particle;
 use crate::propose::{Proposal, propose};
@@ -66,7 +66,8 @@ impl Filter {
         let mut effects = refusals(t, &measured);
         for fit in &measured.fits {
             effects.push(self.take_or_refuse(t, fit)); // 1, 2 and 4: G, X and w, (10), (17–18)
-        } // 3. labels came with the sentences; edges carry them over
+        }
+        self.reground(); // 3. L: edges carry labels over; descriptions are grounded in the map as it is now
         normalise(&mut self.particles);
         self.particles = merge(std::mem::take(&mut self.particles));
         let size = effective_sample_size(&self.particles);

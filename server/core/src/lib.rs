@@ -13,6 +13,7 @@
 //! `X·exp(δ)`, i.e. they live in the body's frame.
 
 pub mod config;
+mod describe;
 pub mod effects;
 pub mod event;
 pub mod filter;
@@ -22,11 +23,14 @@ pub mod grid;
 pub mod inject;
 pub mod labels;
 pub mod language;
+pub mod ledger;
 pub mod listen;
 pub mod loops;
 pub mod mapper;
+mod mend;
 pub mod odometry;
 pub mod particle;
+pub mod predictive;
 pub mod propose;
 pub mod query;
 pub mod random;
@@ -34,6 +38,7 @@ pub mod resample;
 pub mod scan;
 pub mod smoothing;
 pub mod snapshot;
+mod take_in;
 pub mod trajectory;
 pub mod weigh;
 

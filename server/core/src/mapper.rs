@@ -69,7 +69,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 3 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 4 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -99,6 +99,10 @@ impl Mapper {
             Event::Odom(odom) => self.odom(&odom, &mut effects),
             Event::Scan(scan) => self.scan(scan, &mut effects),
             Event::Utterance(utterance) => self.hear(&utterance, &mut effects),
+            Event::Command(command) => {
+                effects.push(Effect::Mended(self.filter.mend(&command)));
+                self.rev += 1;
+            }
             Event::Flush => self.flush(&mut effects),
         }
         effects
@@ -252,6 +256,7 @@ impl Mapper {
         self.place_waiting(None, effects);
         let frozen = self.track.front.freeze(f64::INFINITY);
         self.grow(frozen, effects);
+        self.filter.reground_all();
     }
 
     /// The robot in the best particle's map.

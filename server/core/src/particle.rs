@@ -29,6 +29,9 @@ pub struct Edge {
     pub factor: FactorId,
 }
 
+/// Sentences whose share in the weight can be taken back.
+const SAID_MAX: usize = 64;
+
 /// Equal particles.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Particle {
@@ -38,6 +41,8 @@ pub struct Particle {
     pub belief: Belief,
     /// L.
     pub labels: Labels,
+    /// What the newest sentences added to log w, by utterance: to take them back.
+    pub said: Arc<Vec<(u32, f64)>>,
     /// log w of all of them together; normalised after each step.
     pub log_weight: f64,
     /// How many they are.
@@ -53,6 +58,7 @@ impl Particle {
             edges: Arc::default(),
             belief: Belief::new(),
             labels: Labels::default(),
+            said: Arc::default(),
             log_weight: 0.0,
             count,
             kept_until: 0,
@@ -77,6 +83,28 @@ impl Particle {
             self.belief.settle(structure)?;
         }
         Ok(())
+    }
+
+    /// Weighs by what a sentence says for or against this graph; see [`crate::predictive`].
+    pub fn weigh_by_words(&mut self, utterance: u32, log_ratio: f64) {
+        self.log_weight += log_ratio;
+        let said = Arc::make_mut(&mut self.said);
+        match said.iter_mut().find(|(u, _)| *u == utterance) {
+            Some((_, sum)) => *sum += log_ratio,
+            None => said.push((utterance, log_ratio)),
+        }
+        if said.len() > SAID_MAX {
+            said.remove(0);
+        }
+    }
+
+    /// Takes back what an utterance put into labels and weight. Edges that it proposed stay: they stand
+    /// on scans that agree.
+    pub fn revoke(&mut self, utterance: u32) {
+        self.labels.revoke(utterance);
+        if let Some(at) = self.said.iter().position(|(u, _)| *u == utterance) {
+            self.log_weight -= Arc::make_mut(&mut self.said).remove(at).1;
+        }
     }
 
     /// w of all of them together.

@@ -7,7 +7,7 @@ use crate::graph::{Place, Vertex};
 use crate::grid::grid;
 use crate::labels::LabelId;
 use crate::language::{self, Name};
-use crate::listen::Ledger;
+use crate::ledger::Ledger;
 use crate::mapper::open_poses;
 use crate::particle::Particle;
 use crate::query::{
@@ -177,14 +177,16 @@ impl Snapshot {
     fn names_of(&self, v: Vertex) -> Vec<(String, f64)> {
         let mut sums: BTreeMap<LabelId, f64> = BTreeMap::new();
         for p in &self.particles {
-            for (label, weight) in p.labels.at(v) {
-                *sums.entry(label).or_insert(0.0) += p.weight() * crate::labels::probability(weight);
+            for (label, applies) in p.labels.names(v) {
+                *sums.entry(label).or_insert(0.0) += p.weight() * applies;
             }
         }
         let mut names: Vec<(String, f64)> = sums
             .into_iter()
             .filter(|(_, p)| *p >= PROBABILITY_MIN)
             .map(|(label, p)| (self.ledger.name(label).to_owned(), p))
+            // A tie between two places has none.
+            .filter(|(name, _)| !name.is_empty())
             .collect();
         names.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         names.truncate(NAMES_MAX);

@@ -268,11 +268,6 @@ impl Intake {
 
     fn take_say(&mut self, arrived: Duration, robot: String, mut say: Say) {
         let id = say.robot.clone().unwrap_or_else(|| robot.clone());
-        if say.retracts.is_some() {
-            let problem = Problem::new(ErrorCode::Unsupported, "this server can't take sentences back yet");
-            self.answer_say(&robot, &say.id, problem.field("retracts"));
-            return;
-        }
         let mapping: Vec<&String> =
             self.robots.iter().filter(|(_, r)| r.map().is_some()).map(|(id, _)| id).collect();
         let target = match mapping.as_slice() {

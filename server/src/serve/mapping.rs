@@ -10,7 +10,7 @@ use toponym_core::effects::EdgeKind;
 use toponym_core::{Effect, Mapper};
 use toponym_proto::answer::{ANSWER_VERSION, Jump, MapIdentity, PoseOut};
 use toponym_proto::record::{RecordError, RecordWriter};
-use toponym_proto::{Message, Stamp};
+use toponym_proto::{Mend, Message, Stamp};
 use tracing::{debug, error, info, warn};
 
 use super::board::{Board, MapView, lock};
@@ -51,6 +51,8 @@ impl Due {
 pub enum Work {
     /// Take in the next message of the map's stream.
     Take(Message),
+    /// Mend what was said and tell what was done, or why not; and whether that is on disk.
+    Mend(Mend, SyncSender<Result<(String, bool), String>>),
     /// Save the map and tell whether it went well.
     Save(SyncSender<Result<(), String>>),
     /// Save the map and end.
@@ -79,6 +81,11 @@ impl Mapping {
             let idle = match work.recv_timeout(SNAPSHOT_PERIOD) {
                 Ok(Work::Take(message)) => {
                     self.take(message);
+                    false
+                }
+                Ok(Work::Mend(mend, reply)) => {
+                    let done = self.mend(mend);
+                    let _ = reply.send(done);
                     false
                 }
                 Ok(Work::Save(reply)) => {
@@ -111,8 +118,20 @@ impl Mapping {
         self.graph_due.mark();
     }
 
-    /// One message: into the record, through the filter, its effects out.
-    fn take(&mut self, message: Message) {
+    /// An operator's command goes the way of all messages, so that a replay meets it too.
+    fn mend(&mut self, mend: Mend) -> Result<(String, bool), String> {
+        let effects = self.step(Message::Mend(mend));
+        self.show();
+        let durable = self.sync_record();
+        let done = effects.into_iter().find_map(|e| match e {
+            Effect::Mended(done) => Some(done),
+            _ => None,
+        });
+        done.unwrap_or_else(|| Err("nothing came of it".to_owned())).map(|words| (words, durable))
+    }
+
+    /// One message: into the record, through the filter.
+    fn step(&mut self, message: Message) -> Vec<Effect> {
         if let Some(record) = &mut self.record {
             match record.write(&message) {
                 Ok(()) => self.record_due.mark(),
@@ -124,7 +143,12 @@ impl Mapping {
             self.card.stamp_ns = header.stamp.ns;
             self.view.stamp_ns.store(header.stamp.ns, Ordering::Relaxed);
         }
-        let effects = self.mapper.step(convert::event(message));
+        self.mapper.step(convert::event(message))
+    }
+
+    /// One message of the map's stream, and its effects out.
+    fn take(&mut self, message: Message) {
+        let effects = self.step(message);
         if effects.iter().any(|e| matches!(e, Effect::Heard(_) | Effect::Jumped { .. })) {
             // Who is told of it may ask at once.
             self.show();
@@ -174,6 +198,7 @@ impl Mapping {
             Effect::SegmentBegan { stamp_ns, reason } => warn!(map, stamp_ns, "new segment: {reason}"),
             Effect::EdgeRefused { reason, .. } => debug!(map, "{reason}"),
             Effect::Resampled { effective_sample_size } => debug!(map, effective_sample_size, "resampled"),
+            Effect::Mended(done) => info!(map, "mended: {done:?}"),
             Effect::PlaceBegan { .. } | Effect::ScanPlaced { .. } | Effect::Weighed { .. } => {}
         }
     }

@@ -7,9 +7,10 @@ use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use toponym_core::{Answer, Query};
-use toponym_proto::answer::{ANSWER_VERSION, Done, ErrorCode, Info, Problem};
+use toponym_proto::answer::{ANSWER_VERSION, Done, ErrorCode, Info, Mended, Problem};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
+use toponym_proto::{Limits, Mend, Message};
 
 use super::board::{Board, MapView, lock};
 use super::mapping::Work;
@@ -75,10 +76,11 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
     match board.keys.chunks(key).unwrap_or_default().as_slice() {
         ["info"] => info(board, &arguments),
         ["do", "save"] => save(board, &arguments),
+        ["do", command @ ("undo" | "rename" | "forget")] => mend(board, command, arguments),
         ["do", command] => {
             Err(Problem::new(ErrorCode::Unsupported, format!("there is no command {command:?}"))
                 .field("key")
-                .hint("this server knows do/save"))
+                .hint("this server knows do/save, do/undo, do/rename, do/forget"))
         }
         ["map", id, "ask", what] => {
             let map = map(board, id)?;
@@ -231,6 +233,58 @@ fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
         }
     }
     json(&Done { v: ANSWER_VERSION, query: "save".into(), maps: saved })
+}
+
+/// `do/undo?id=…`, `do/rename?from=…;to=…`, `do/forget?name=…`, each with `map=…` where there are several.
+fn mend(board: &Board, command: &str, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+    let given = |field: &str, value: Option<String>| {
+        value.ok_or_else(|| Problem::new(ErrorCode::BadArgument, format!("{field} is missing")).field(field))
+    };
+    let (id, mend) = match command {
+        "undo" => {
+            let [map, id] = take(arguments, ["map", "id"])?;
+            (map, Mend::Undo { id })
+        }
+        "rename" => {
+            let [map, from, to] = take(arguments, ["map", "from", "to"])?;
+            (map, Mend::Rename { from: given("from", from)?, to: given("to", to)? })
+        }
+        _ => {
+            let [map, name] = take(arguments, ["map", "name"])?;
+            (map, Mend::Forget { name: given("name", name)? })
+        }
+    };
+    Message::Mend(mend.clone()).validate(&Limits::default()).map_err(Problem::from)?;
+    let map = match id {
+        Some(id) => map(board, &id)?,
+        None => only_map(board)?,
+    };
+    let (reply, done) = sync_channel(1);
+    let stopped = || Problem::new(ErrorCode::Internal, format!("map {:?} has stopped", map.id));
+    map.work.send(Work::Mend(mend, reply)).map_err(|_| stopped())?;
+    match done.recv_timeout(COMMAND_WAIT) {
+        Ok(Ok((words, durable))) => {
+            let (query, map) = (command.to_owned(), map.id.clone());
+            json(&Mended { v: ANSWER_VERSION, query, map, words, durable })
+        }
+        Ok(Err(why)) => Err(Problem::new(ErrorCode::NothingToMend, why)),
+        // Not `busy`, which is asked again: it may be done yet.
+        Err(_) => Err(Problem::new(ErrorCode::Internal, format!("map {:?} did not answer in time", map.id))),
+    }
+}
+
+fn only_map(board: &Board) -> Result<Arc<MapView>, Problem> {
+    let maps = board.maps.load();
+    let mut all = maps.values();
+    match (all.next(), all.next()) {
+        (Some(only), None) => Ok(only.clone()),
+        (None, _) => map(board, ""),
+        _ => {
+            let known: Vec<&str> = maps.keys().map(String::as_str).collect();
+            let hint = format!("say which: {}", known.join(", "));
+            Err(Problem::new(ErrorCode::BadArgument, "there are several maps").field("map").hint(hint))
+        }
+    }
 }
 
 #[cfg(test)]

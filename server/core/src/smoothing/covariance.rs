@@ -12,13 +12,13 @@
 //! its Y begins and ends.
 
 use super::factor::{sandwich, symmetrised};
-use super::inverse::{Fill, Scratch, filled_len, grow};
-use super::kernels::block_of;
+use super::inverse::Sigma;
 use super::structure::Structure;
 use super::tree::{Clique, NONE};
 use super::{Belief, SmoothError};
 use crate::geometry::Pose2;
 use nalgebra::Matrix3;
+use std::hint::black_box;
 use std::rc::Rc;
 
 /// Joint covariance of the newest pose with others.
@@ -133,46 +133,64 @@ impl Belief {
     pub fn joint_all(&self, structure: &Structure) -> Result<Joint, SmoothError> {
         let newest = self.len().saturating_sub(1) as u32;
         self.check(structure, newest)?;
-        let tree = &structure.tree;
         // The origin's are zero; those of marginalised poses are left out at the end.
         let zeros = |j: usize| JointPart { j: j as u32, marginal: Matrix3::zeros(), cross: Matrix3::zeros() };
         let mut others: Vec<JointPart> = (0..self.len()).map(zeros).collect();
-        let mut scratch = Scratch::default();
-        let mut spare: Vec<Vec<f64>> = Vec::new();
-        let mut stack: Vec<(u32, Rc<Vec<f64>>)> = Vec::new();
-        let roots = tree.cliques.iter().enumerate().filter(|(_, c)| c.frontals > 0 && c.parent == NONE);
-        stack.extend(roots.map(|(c, _)| (c as u32, Rc::default())));
-        while let Some((c, above)) = stack.pop() {
-            let clique = &tree.cliques[c as usize];
-            let Some(front) = &self.fronts[c as usize] else { return Err(SmoothError::Behind) };
-            let n = 3 * clique.poses.len();
-            let mut own = spare.pop().unwrap_or_default();
-            gather(clique, tree.cliques.get(clique.parent as usize), &above, &mut own);
-            let outer = if clique.children.is_empty() { Fill::Diagonal } else { Fill::All };
-            front.fill_covariance(&mut own, &mut scratch, outer);
-            let (sigma, rest) = own.split_at_mut(n * n);
-            let cross = &mut rest[..3 * n];
-            if let Some(at) = clique.poses[..clique.frontals].iter().position(|&p| p == newest) {
-                // Its cross-covariances begin here: with those of its own clique.
-                cross.copy_from_slice(&sigma[3 * at * n..][..3 * n]);
+        self.descend(structure, |frontals, sigma| {
+            if let Some(k) = frontals.iter().position(|&p| p == newest) {
+                sigma.begin_newest(k);
             }
-            for (k, &j) in clique.poses[..clique.frontals].iter().enumerate() {
-                let part = &mut others[j as usize];
-                part.marginal = block_of(columns(sigma, n, 3 * k), 3 * k);
-                part.cross = block_of(columns(cross, n, 0), 3 * k).transpose();
+            for (k, &j) in frontals.iter().enumerate() {
+                others[j as usize] = JointPart { j, marginal: sigma.marginal(k), cross: sigma.cross(k) };
             }
-            if let Ok(done) = Rc::try_unwrap(above) {
-                spare.push(done);
-            }
-            let own = Rc::new(own);
-            stack.extend(clique.children.iter().map(|&child| (child, Rc::clone(&own))));
-            if let Ok(leaf) = Rc::try_unwrap(own) {
-                spare.push(leaf);
-            }
-        }
+        })?;
         let marginal = others[newest as usize].marginal;
         others.retain(|p| structure.check_pose(p.j).is_ok());
         Ok(Joint { newest, marginal, others })
+    }
+
+    /// Covariances of each clique, from the roots down; `visit` gets its frontals and them.
+    fn descend(
+        &self,
+        structure: &Structure,
+        mut visit: impl FnMut(&[u32], &mut Sigma),
+    ) -> Result<(), SmoothError> {
+        let cliques = &structure.tree.cliques;
+        let mut spare: Vec<Sigma> = Vec::new();
+        let mut stack: Vec<(u32, Option<Rc<Sigma>>)> = Vec::new();
+        let roots = cliques.iter().enumerate().filter(|(_, c)| c.frontals > 0 && c.parent == NONE);
+        stack.extend(roots.map(|(c, _)| (c as u32, None)));
+        while let Some((c, above)) = stack.pop() {
+            let clique = &cliques[c as usize];
+            let Some(front) = &self.fronts[c as usize] else { return Err(SmoothError::Behind) };
+            let mut own = spare.pop().unwrap_or_default();
+            own.gather(clique, above.as_deref());
+            own.fill(front, clique.children.is_empty());
+            visit(&clique.poses[..clique.frontals], &mut own);
+            spare.extend(above.and_then(Rc::into_inner));
+            let own = Rc::new(own);
+            let from = stack.len();
+            for &child in &clique.children {
+                self.read_ahead(child, &cliques[child as usize]);
+                stack.push((child, Some(Rc::clone(&own))));
+            }
+            spare.extend(Rc::into_inner(own));
+            // The largest last: then few large ones wait for other children at a time.
+            let size = |k: &usize| cliques[stack[*k].0 as usize].poses.len();
+            if let Some(largest) = (from..stack.len()).max_by_key(size) {
+                stack.swap(from, largest);
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads from where a clique's numbers lie, so that they are near once it is its turn: each is
+    /// somewhere else in memory, and much of the time would go into waiting for one after the other,
+    /// while here the processor fetches them side by side.
+    fn read_ahead(&self, c: u32, clique: &Clique) {
+        let front = self.fronts[c as usize].as_ref().map(|front| front.touched());
+        let lists = [&clique.poses, &clique.slots, &clique.children].map(|list| list.first().copied());
+        black_box((front, lists));
     }
 
     fn check(&self, structure: &Structure, pose: u32) -> Result<(), SmoothError> {
@@ -220,30 +238,6 @@ impl Belief {
                 }
                 std::mem::swap(&mut b, &mut above);
             }
-        }
-    }
-}
-
-/// Three columns from column c, of n rows each.
-fn columns(m: &[f64], n: usize, c: usize) -> [&[f64]; 3] {
-    [&m[c * n..][..n], &m[(c + 1) * n..][..n], &m[(c + 2) * n..][..n]]
-}
-
-/// The separators' part of a clique's covariances, from its parent's: a symmetric matrix over the
-/// front, then three columns of cross-covariances with the newest pose.
-fn gather(clique: &Clique, parent: Option<&Clique>, above: &[f64], into: &mut Vec<f64>) {
-    let n = 3 * clique.poses.len();
-    // What is not written here the front fills in.
-    grow(into, filled_len(n));
-    let Some(parent) = parent else { return };
-    let m = 3 * parent.poses.len();
-    let from = 3 * clique.frontals;
-    let columns = clique.slots.iter().flat_map(|&slot| [0, 1, 2].map(|c| 3 * slot as usize + c));
-    for (k, column) in columns.chain(m..m + 3).enumerate() {
-        let source = &above[column * m..][..m];
-        let at = if column < m { (from + k) * n } else { (n + column - m) * n };
-        for (into, &slot) in into[at + from..at + n].chunks_exact_mut(3).zip(&clique.slots) {
-            into.copy_from_slice(&source[3 * slot as usize..][..3]);
         }
     }
 }

@@ -37,6 +37,11 @@ pub(super) struct Front {
 }
 
 impl Front {
+    /// Sum of every eighth number of the frontals' panels: one from each line of memory, of 64 bytes.
+    pub fn touched(&self) -> f64 {
+        self.values[..offset(self.blocks, self.frontals)].iter().step_by(8).sum()
+    }
+
     /// Zeros.
     pub fn new(blocks: usize, frontals: usize) -> Self {
         Self { blocks, frontals, values: vec![0.0; offset(blocks, blocks)], root: None }

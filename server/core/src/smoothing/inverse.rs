@@ -1,184 +1,194 @@
-//! The selected inverse: from the covariances of a clique's separators those of its frontals
-//! (Takahashi, Fagan, Chin 1973), a clique at a time:
+//! The selected inverse: a clique's covariances from those of its separators, a pose at a time
+//! (Takahashi, Fagan, Chin 1973). With R the poses after j in the clique,
 //!
 //! ```text
-//! Y = L_S L_FF⁻¹,   Σ_SF = −Σ_SS Y,   Σ_FF = L_FF⁻ᵀ L_FF⁻¹ − Yᵀ Σ_SF
+//! Y = L_Rj L_jj⁻¹,   Σ_Rj = −Σ_RR Y,   Σ_tj = −Σ_tR Y,   Σ_jj = L_jj⁻ᵀ L_jj⁻¹ − Yᵀ Σ_Rj
 //! ```
 
 // Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
 #![allow(clippy::inline_always)]
 
+use super::factor::symmetrised;
 use super::front::Front;
-use super::kernels::{block_of, columns_of, rows_of, solve_lower, subtract_products, wide};
+use super::kernels::{block_of, dots, rows_of, solve_lower, wide};
+use super::tree::Clique;
 use nalgebra::Matrix3;
 
-/// Rows of Σ_SS Y that are summed side by side.
-const TILE: usize = 8;
+/// Rows come in whole registers of so many numbers, as wide as those of most processors: no loop has a
+/// remainder to do one by one.
+const LANES: usize = 4;
 
-/// Which covariances of a clique are asked for.
-#[derive(Clone, Copy, PartialEq, Eq)]
-pub(super) enum Fill {
-    /// Each frontal's with itself: enough for a leaf.
-    Diagonal,
-    /// All, for the children to take theirs from.
-    All,
-}
-
-/// Working memory, used again from clique to clique.
+/// Covariances over a clique's coordinates, and three rows below them those with the newest pose: column
+/// after column. What is not filled is of no account.
 #[derive(Default)]
-pub(super) struct Scratch {
-    /// `[L_FF⁻¹; Y]`, n rows by 3·frontals.
+pub(super) struct Sigma {
+    /// Coordinates.
+    n: usize,
+    /// Rows, whole registers of them.
+    height: usize,
+    values: Vec<f64>,
+    /// Y, three columns.
     y: Vec<f64>,
-    /// Σ_SS Y.
-    product: Vec<f64>,
 }
 
-/// Numbers that hold the covariances over n coordinates: a symmetric matrix column after column, three
-/// columns of cross-covariances with the newest pose, and what the last tile reads beyond.
-pub(super) fn filled_len(n: usize) -> usize {
-    n * n + 3 * n + TILE
-}
-
-/// Makes room; what is there is of no account, and never cleared.
-pub(super) fn grow(values: &mut Vec<f64>, len: usize) {
-    if values.len() < len {
-        values.resize(len, 0.0);
+impl Sigma {
+    /// Makes room for a clique's, and takes those of its separators from its parent's.
+    pub fn gather(&mut self, clique: &Clique, parent: Option<&Self>) {
+        self.n = 3 * clique.poses.len();
+        self.height = (self.n + 3).next_multiple_of(LANES);
+        grow(&mut self.values, self.n * self.height);
+        grow(&mut self.y, 3 * self.n);
+        if let Some(parent) = parent {
+            wide(
+                #[inline(always)]
+                || self.gather_inline(clique, parent),
+            );
+        }
     }
-}
 
-impl Front {
-    /// Fills the frontals' covariances into `sigma` (see [`filled_len`]), which holds the separators'.
-    pub fn fill_covariance(&self, sigma: &mut [f64], scratch: &mut Scratch, fill: Fill) {
+    #[inline(always)]
+    fn gather_inline(&mut self, clique: &Clique, parent: &Self) {
+        let (h, from, last) = (self.height, 3 * clique.frontals, parent.n);
+        let mut rest = &mut self.values[from * h..];
+        for &slot in &clique.slots {
+            let [t0, t1, t2] = parent.columns(slot as usize);
+            let (own, after) = rest.split_at_mut(3 * h);
+            let (o0, others) = own.split_at_mut(h);
+            let (o1, o2) = others.split_at_mut(h);
+            let mut at = from;
+            for &slot in &clique.slots {
+                // A register's worth: the fourth number is overwritten by what comes next.
+                let theirs = 3 * slot as usize..3 * slot as usize + LANES;
+                o0[at..at + LANES].copy_from_slice(&t0[theirs.clone()]);
+                o1[at..at + LANES].copy_from_slice(&t1[theirs.clone()]);
+                o2[at..at + LANES].copy_from_slice(&t2[theirs]);
+                at += 3;
+            }
+            o0[at..at + 3].copy_from_slice(&t0[last..last + 3]);
+            o1[at..at + 3].copy_from_slice(&t1[last..last + 3]);
+            o2[at..at + 3].copy_from_slice(&t2[last..last + 3]);
+            rest = after;
+        }
+    }
+
+    /// Fills in the frontals'; for a leaf not all of those among them.
+    pub fn fill(&mut self, front: &Front, is_leaf: bool) {
         wide(
             #[inline(always)]
-            || self.fill_inline(sigma, scratch, fill),
+            || {
+                for j in (0..front.frontals).rev() {
+                    self.fill_pose(j, front.columns(j), j > 0 || !is_leaf);
+                }
+            },
         );
     }
 
+    /// Σ_Rj, Σ_tj and Σ_jj, and Σ_jR if `both`.
     #[inline(always)]
-    fn fill_inline(&self, sigma: &mut [f64], scratch: &mut Scratch, fill: Fill) {
-        let (n, f) = (3 * self.blocks, 3 * self.frontals);
-        let s = n - f;
-        self.solve_separators(&mut scratch.y);
-        // A tile's last rows may lie beyond the separators.
-        let height = s.next_multiple_of(TILE);
-        grow(&mut scratch.product, height * f);
-        multiply(&sigma[f * n..], n, f, &scratch.y, n, &mut scratch.product, height);
-        let y = |c: usize| &scratch.y[c * n..][..n];
-        let product = |c: usize| &scratch.product[c * height..][..s];
-        for j in 0..f {
-            let first = if fill == Fill::All { 0 } else { j / 3 * 3 };
-            for i in first..=j {
-                // L_FF⁻¹ is lower triangular: its columns begin at their own rows.
-                let value = dot(&y(i)[j..f], &y(j)[j..f]) + dot(&y(i)[f..], product(j));
-                (sigma[j * n + i], sigma[i * n + j]) = (value, value);
-            }
-            if fill == Fill::All {
-                for (m, v) in product(j).iter().enumerate() {
-                    sigma[j * n + f + m] = -v;
-                    sigma[(f + m) * n + j] = -v;
-                }
+    fn fill_pose(&mut self, j: usize, panel: [&[f64]; 3], both: bool) {
+        let (n, h, from) = (self.n, self.height, 3 * (j + 1));
+        let rows = n - from;
+        let l_jj = block_of(panel, 0);
+        let y = &mut self.y[..3 * rows];
+        let (y0, rest) = y.split_at_mut(rows);
+        let (y1, y2) = rest.split_at_mut(rows);
+        divide(rows_of(panel, 3..3 + rows), &l_jj, [&mut *y0, &mut *y1, &mut *y2]);
+        let y = [&*y0, &*y1, &*y2];
+        let (head, done) = self.values.split_at_mut(from * h);
+        let own = &mut head[3 * j * h..];
+        // From a whole register on: those above R are not filled yet, and will be.
+        let mut at = from / LANES * LANES;
+        while at < h {
+            at += match h - at {
+                4 => multiply::<4>(done, h, at, y, own),
+                8 => multiply::<8>(done, h, at, y, own),
+                _ => multiply::<12>(done, h, at, y, own),
+            };
+        }
+        let (p0, rest) = own.split_at_mut(h);
+        let (p1, p2) = rest.split_at_mut(h);
+        let p = rows_of([p0, p1, p2], from..n);
+        let inverse = solve_lower(&l_jj, &Matrix3::identity());
+        let sigma_jj =
+            inverse.tr_mul(&inverse) - Matrix3::from([dots(y, p[0]), dots(y, p[1]), dots(y, p[2])]);
+        if both {
+            let mut at = from - 3;
+            for ((a, b), c) in p[0].iter().zip(p[1]).zip(p[2]) {
+                done[at..at + 3].copy_from_slice(&[*a, *b, *c]);
+                at += h;
             }
         }
-        let cross = &mut sigma[n * n..][..3 * n];
-        for column in cross.chunks_exact_mut(n) {
-            let (frontals, separators) = column.split_at_mut(f);
-            for (j, v) in frontals.iter_mut().enumerate() {
-                *v = -dot(&y(j)[f..], separators);
-            }
+        for c in 0..3 {
+            own[c * h + 3 * j..][..3].copy_from_slice(sigma_jj.column(c).as_slice());
         }
     }
 
-    /// `[L_FF⁻¹; L_S L_FF⁻¹]`, n rows by 3·frontals, column after column.
-    #[inline(always)]
-    fn solve_separators(&self, y: &mut Vec<f64>) {
-        let n = 3 * self.blocks;
-        grow(y, n * 3 * self.frontals);
-        for j in (0..self.frontals).rev() {
-            let panel = self.columns(j);
-            let own = block_of(panel, 0);
-            let (head, done) = y.split_at_mut(3 * (j + 1) * n);
-            let (c0, rest) = head[3 * j * n..].split_at_mut(n);
-            let (c1, c2) = rest.split_at_mut(n);
-            let below = 3 * self.frontals;
-            let from = below - 3 * j;
-            let l_s = rows_of(panel, from..from + n - below);
-            for (column, l_s) in [&mut *c0, &mut *c1, &mut *c2].into_iter().zip(l_s) {
-                column[3 * (j + 1)..below].fill(0.0);
-                column[below..].copy_from_slice(l_s);
-            }
-            for k in j + 1..self.frontals {
-                let l_kj = columns_of(&block_of(panel, 3 * (k - j)));
-                let y_k = &done[3 * (k - j - 1) * n..][..3 * n];
-                let (y0, rest) = y_k.split_at(n);
-                let (y1, y2) = rest.split_at(n);
-                let at = 3 * k;
-                let into = [&mut c0[at..], &mut c1[at..], &mut c2[at..]];
-                subtract_products(into, [&y0[at..], &y1[at..], &y2[at..]], l_kj, n - at);
-            }
-            divide([&mut c0[3 * (j + 1)..], &mut c1[3 * (j + 1)..], &mut c2[3 * (j + 1)..]], &own);
-            let inverse = solve_lower(&own, &Matrix3::identity());
-            for (c, column) in [c0, c1, c2].into_iter().enumerate() {
-                column[3 * j..][..3].copy_from_slice(inverse.column(c).as_slice());
-            }
+    /// Pose k is the newest: below this clique its covariances go along.
+    pub fn begin_newest(&mut self, k: usize) {
+        for column in self.values.chunks_exact_mut(self.height).take(self.n) {
+            column.copy_within(3 * k..3 * k + 3, self.n);
         }
+    }
+
+    /// Σ_kk.
+    pub fn marginal(&self, k: usize) -> Matrix3<f64> {
+        symmetrised(&block_of(self.columns(k), 3 * k))
+    }
+
+    /// Σ_tk, t the newest pose.
+    pub fn cross(&self, k: usize) -> Matrix3<f64> {
+        block_of(self.columns(k), self.n)
+    }
+
+    #[inline(always)]
+    fn columns(&self, k: usize) -> [&[f64]; 3] {
+        let (c0, rest) = self.values[3 * k * self.height..][..3 * self.height].split_at(self.height);
+        let (c1, c2) = rest.split_at(self.height);
+        [c0, c1, c2]
     }
 }
 
-/// `X ← X L⁻¹` of a lower triangular block.
+/// Makes room; what was there is of no account.
+fn grow(values: &mut Vec<f64>, len: usize) {
+    if values.len() < len {
+        *values = vec![0.0; len];
+    }
+}
+
+/// `X L⁻¹` of a lower triangular block.
 #[inline(always)]
-fn divide([x0, x1, x2]: [&mut [f64]; 3], l: &Matrix3<f64>) {
+fn divide([x0, x1, x2]: [&[f64]; 3], l: &Matrix3<f64>, [y0, y1, y2]: [&mut [f64]; 3]) {
     let (i0, i1, i2) = (1.0 / l.m11, 1.0 / l.m22, 1.0 / l.m33);
-    for ((a, b), c) in x0.iter_mut().zip(x1).zip(x2) {
-        *c *= i2;
-        *b = (*b - *c * l.m32) * i1;
-        *a = (*a - *b * l.m21 - *c * l.m31) * i0;
+    let rows = x0.len();
+    let (x1, x2) = (&x1[..rows], &x2[..rows]);
+    let (y0, y1, y2) = (&mut y0[..rows], &mut y1[..rows], &mut y2[..rows]);
+    for i in 0..rows {
+        let c = x2[i] * i2;
+        let b = (x1[i] - c * l.m32) * i1;
+        (y0[i], y1[i], y2[i]) = ((x0[i] - b * l.m21 - c * l.m31) * i0, b, c);
     }
 }
 
-/// `product = Σ_SS Y`: Σ's columns are n apart, and the separators' rows of Σ and Y begin at f; the
-/// product's columns are `height` apart.
+/// Some rows of `−Σ Y`, of Σ's columns that are h apart, into columns as far apart. Returns how many.
 #[inline(always)]
-fn multiply(sigma: &[f64], n: usize, f: usize, y: &[f64], stride: usize, product: &mut [f64], height: usize) {
-    for from in (0..height).step_by(TILE) {
-        for c in (0..f).step_by(3) {
-            let y = &y[c * stride..][..3 * stride];
-            let y = rows_of([y, &y[stride..], &y[2 * stride..]], f..n);
-            let sums = tile(&sigma[f + from..], n, y);
-            for (k, sum) in sums.iter().enumerate() {
-                product[(c + k) * height + from..][..TILE].copy_from_slice(sum);
-            }
-        }
-    }
-}
-
-/// Some rows of Σ's columns, n apart, times three columns.
-#[inline(always)]
-fn tile(sigma: &[f64], n: usize, [y0, y1, y2]: [&[f64]; 3]) -> [[f64; TILE]; 3] {
-    let mut sums = [[0.0; TILE]; 3];
+fn multiply<const ROWS: usize>(
+    sigma: &[f64],
+    h: usize,
+    at: usize,
+    [y0, y1, y2]: [&[f64]; 3],
+    into: &mut [f64],
+) -> usize {
+    let mut sums = [[0.0; ROWS]; 3];
     for (k, ((y0, y1), y2)) in y0.iter().zip(y1).zip(y2).enumerate() {
-        let column = &sigma[k * n..][..TILE];
-        for r in 0..TILE {
-            sums[0][r] = column[r].mul_add(*y0, sums[0][r]);
-            sums[1][r] = column[r].mul_add(*y1, sums[1][r]);
-            sums[2][r] = column[r].mul_add(*y2, sums[2][r]);
+        let column = &sigma[k * h + at..][..ROWS];
+        for r in 0..ROWS {
+            sums[0][r] = column[r].mul_add(-y0, sums[0][r]);
+            sums[1][r] = column[r].mul_add(-y1, sums[1][r]);
+            sums[2][r] = column[r].mul_add(-y2, sums[2][r]);
         }
     }
-    sums
-}
-
-/// `aᵀb` in eight interleaved sums.
-#[inline(always)]
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut sums = [0.0f64; TILE];
-    let whole = a.len().min(b.len()) / TILE * TILE;
-    for (a, b) in a[..whole].chunks_exact(TILE).zip(b[..whole].chunks_exact(TILE)) {
-        for r in 0..TILE {
-            sums[r] = a[r].mul_add(b[r], sums[r]);
-        }
+    for (k, sums) in sums.iter().enumerate() {
+        into[k * h + at..][..ROWS].copy_from_slice(sums);
     }
-    for (a, b) in a[whole..].iter().zip(&b[whole..]) {
-        sums[0] = a.mul_add(*b, sums[0]);
-    }
-    ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]))
+    ROWS
 }

@@ -1,5 +1,6 @@
 //! The core from events to answers, on a simulated ring corridor.
 
+mod talk;
 mod world;
 
 use toponym_core::effects::{EdgeKind, Effect, Effects, HeardStatus, TrackState};
@@ -110,7 +111,7 @@ fn rubbish_is_no_map() {
 #[test]
 fn a_map_of_an_older_format_is_told_from_rubbish() {
     let mut bytes = Mapper::new(Config::default()).save().unwrap();
-    let number = bytes.iter().position(|b| *b == b'3').unwrap();
+    let number = bytes.iter().position(u8::is_ascii_digit).unwrap();
     bytes[number] = b'1';
     let error = Mapper::load(&bytes).unwrap_err();
     assert!(matches!(error, SaveError::Format { .. }), "{error}");

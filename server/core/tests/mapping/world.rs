@@ -159,5 +159,6 @@ pub fn say(id: &str, text: &str, began_ns: i64) -> Utterance {
         speaker: None,
         began_ns,
         ended_ns: began_ns,
+        retracts: None,
     }
 }

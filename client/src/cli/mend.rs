@@ -1,0 +1,92 @@
+//! `toponym undo`, `rename` and `forget`: an operator mends what was said.
+
+use super::{Failure, exit};
+use std::time::Duration;
+use toponym::{ClientError, Planner};
+use toponym_proto::Mend;
+use toponym_proto::answer::ErrorCode;
+
+/// Arguments of `undo`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  toponym undo                              the newest sentence that stands
+  toponym undo 01JD2E4T9Q0000000000000000   the sentence with this id: `toponym where NAME --json` lists
+                                            those that an answer rests on
+
+Exit code 1 if there is no such sentence.")]
+pub struct UndoArgs {
+    /// The sentence's id.
+    id: Option<String>,
+    #[command(flatten)]
+    at: At,
+}
+
+/// Arguments of `rename`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example:
+  toponym rename 'jim' 'gym'
+
+Whoever says or asks the wrong name means the right one from now on. Exit code 1 if nobody named it.")]
+pub struct RenameArgs {
+    /// The name as it is.
+    from: String,
+    /// The name as it should be.
+    to: String,
+    #[command(flatten)]
+    at: At,
+}
+
+/// Arguments of `forget`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example:
+  toponym forget 'printer room'
+
+It may be taught again. Exit code 1 if nobody named it.")]
+pub struct ForgetArgs {
+    /// The name.
+    name: String,
+    #[command(flatten)]
+    at: At,
+}
+
+/// Which map, and how patiently.
+#[derive(Debug, clap::Args)]
+struct At {
+    /// Which map.
+    #[arg(long, default_value = "main")]
+    map: String,
+    /// How long to wait for the answer.
+    #[arg(long, value_name = "S", default_value = "10", value_parser = super::seconds)]
+    timeout: Duration,
+}
+
+pub async fn undo(endpoint: &str, site: &str, args: &UndoArgs) -> Result<u8, Failure> {
+    mend(endpoint, site, &args.at, &Mend::Undo { id: args.id.clone() }).await
+}
+
+pub async fn rename(endpoint: &str, site: &str, args: &RenameArgs) -> Result<u8, Failure> {
+    mend(endpoint, site, &args.at, &Mend::Rename { from: args.from.clone(), to: args.to.clone() }).await
+}
+
+pub async fn forget(endpoint: &str, site: &str, args: &ForgetArgs) -> Result<u8, Failure> {
+    mend(endpoint, site, &args.at, &Mend::Forget { name: args.name.clone() }).await
+}
+
+async fn mend(endpoint: &str, site: &str, at: &At, mend: &Mend) -> Result<u8, Failure> {
+    let session = toponym::open(endpoint).await?;
+    let planner = Planner::new(&session, site, &at.map, at.timeout)?;
+    match planner.mend(mend).await {
+        Ok(mended) => {
+            println!("{}", mended.words);
+            Ok(exit::FOUND)
+        }
+        Err(ClientError::Refused(problem)) if problem.code == ErrorCode::NothingToMend => {
+            println!("{}", problem.message);
+            Ok(exit::NOT_KNOWN)
+        }
+        Err(e) => Err(e.into()),
+    }
+}

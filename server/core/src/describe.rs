@@ -1,0 +1,190 @@
+//! Step 3 of Algorithm 1, descriptions: where each particle puts what a sentence locates, eqs.
+//! (13–16), when it is said and again as the map grows: what was not there yet may be by now.
+
+use crate::filter::Filter;
+use crate::geometry::Pose2;
+use crate::graph::Vertex;
+use crate::labels::{Evidence, LabelId, Labels, Source};
+use crate::language::act::{Head, Locate, Parse, Phrase, Restriction};
+use crate::language::{GroundPlace, ground};
+use crate::ledger::Ledger;
+use crate::listen::locates;
+use crate::particle::Particle;
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Groundings less probable are not kept.
+const GROUNDED_MIN: f64 = 0.002;
+/// Descriptions grounded again per place, in turn.
+const AGAIN_PER_PLACE: usize = 1;
+/// "This hallway" and "the nearest exit" are about so near.
+const THIS_M: f64 = 10.0;
+
+impl Filter {
+    /// Grounds what a sentence locates in every particle, anew if it was before. `poses` of a
+    /// particle's places, with the path travelled up to each.
+    pub(crate) fn ground(
+        &mut self,
+        utterance: u32,
+        parse: &Parse,
+        held: Vertex,
+        poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
+        path_m: &[f64],
+    ) {
+        let figures: Vec<_> = locates(parse).filter_map(|(_, l)| l.figure.label()).collect();
+        if figures.is_empty() {
+            return;
+        }
+        let ledger = Arc::make_mut(&mut self.ledger);
+        for name in &figures {
+            ledger.enter_name(name);
+        }
+        let ledger = &self.ledger;
+        self.particles.par_iter_mut().for_each(|p| {
+            let scene = Scene {
+                places: places(&poses(p), path_m),
+                labels: &p.labels,
+                ledger,
+                utterance,
+                held: held as usize,
+            };
+            let grounded = scene.grounded(parse);
+            p.labels.reground(utterance, &grounded);
+        });
+    }
+
+    /// Grounds some descriptions again, one after the other in turn, in the map as it is now.
+    pub(crate) fn reground(&mut self) {
+        let (turn, all) = (self.graph.places().len(), self.ledger.descriptions().len());
+        let due = (0..AGAIN_PER_PLACE.min(all)).map(|k| (turn * AGAIN_PER_PLACE + k) % all);
+        let due: Vec<u32> = due.filter_map(|k| self.ledger.descriptions().nth(k)).collect();
+        self.reground_some(&due);
+    }
+
+    /// Grounds all descriptions again.
+    pub fn reground_all(&mut self) {
+        let all: Vec<u32> = self.ledger.descriptions().collect();
+        self.reground_some(&all);
+    }
+
+    fn reground_some(&mut self, utterances: &[u32]) {
+        let path_m: Vec<f64> = self.graph.places().iter().map(|p| p.path_m).collect();
+        for &utterance in utterances {
+            let entry = &self.ledger.entries()[utterance as usize];
+            // Said at a place that is not in the graph yet: its time will come.
+            if (entry.held as usize) < path_m.len() {
+                let (parse, held) = (entry.parse.clone(), entry.held);
+                self.ground(utterance, &parse, held, &|p| p.belief.poses(), &path_m);
+            }
+        }
+    }
+
+    /// Grounds again the descriptions that speak of a name, as something new was said of it.
+    pub(crate) fn reground_about(
+        &mut self,
+        label: LabelId,
+        poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
+        path_m: &[f64],
+    ) {
+        let speaks =
+            |p: &Phrase| p.label().is_some_and(|name| self.ledger.label(name.as_str()) == Some(label));
+        let about = |l: &Locate| speaks(&l.figure) || l.landmarks.iter().any(speaks);
+        let of = |u: &u32| &self.ledger.entries()[*u as usize];
+        let due = self.ledger.descriptions().filter(|u| locates(&of(u).parse).any(|(_, l)| about(l)));
+        let due: Vec<(u32, Parse, Vertex)> = due.map(|u| (u, of(&u).parse.clone(), of(&u).held)).collect();
+        for (utterance, parse, held) in due {
+            self.ground(utterance, &parse, held, poses, path_m);
+        }
+    }
+}
+
+fn places(poses: &[Pose2], path_m: &[f64]) -> Vec<GroundPlace> {
+    let place =
+        |(p, &path_m): (&Pose2, &f64)| GroundPlace { x_m: p.x_m, y_m: p.y_m, yaw_rad: p.yaw_rad, path_m };
+    poses.iter().zip(path_m).map(place).collect()
+}
+
+/// One particle's map, seen from where the sentence was said.
+struct Scene<'a> {
+    places: Vec<GroundPlace>,
+    labels: &'a Labels,
+    ledger: &'a Ledger,
+    utterance: u32,
+    held: usize,
+}
+
+impl Scene<'_> {
+    /// Δα of all that a sentence locates, over its readings.
+    fn grounded(&self, parse: &Parse) -> Vec<Evidence> {
+        let mut sums: BTreeMap<(LabelId, Vertex), f64> = BTreeMap::new();
+        for (certainty, l) in locates(parse) {
+            let Some(said) = l.figure.label().and_then(|name| self.ledger.said(name.as_str())) else {
+                continue;
+            };
+            let label = self.ledger.meant(said);
+            if !self.ledger.speaks_of(self.utterance, label) {
+                continue;
+            }
+            let p = self.place_of(l, Some(label));
+            for (v, p) in p.iter().enumerate().filter(|(_, p)| **p >= GROUNDED_MIN) {
+                *sums.entry((said, v as Vertex)).or_insert(0.0) += certainty * p;
+            }
+        }
+        let evidence = |((said, place), weight)| {
+            let (utterance, label) = (self.utterance, self.ledger.meant(said));
+            Evidence { utterance, said, label, place, weight, source: Source::Grounded }
+        };
+        sums.into_iter().map(evidence).collect()
+    }
+
+    /// p(figure is place i | λ), eq. (14).
+    fn place_of(&self, l: &Locate, figure: Option<LabelId>) -> Vec<f64> {
+        let landmark = l.landmarks.first().map_or_else(Vec::new, |p| self.landmark(p));
+        let prior = figure.map_or_else(Vec::new, |figure| self.applies(figure));
+        ground(l.relation, &self.places, self.held, &landmark, &prior).p
+    }
+
+    /// Where a landmark may be: (place, probability), summing to at most one; empty if nobody knows.
+    fn landmark(&self, phrase: &Phrase) -> Vec<(usize, f64)> {
+        let mut p: Vec<f64> = match (&phrase.head, phrase.label()) {
+            (Head::Here | Head::Agent | Head::Speaker | Head::Path, _) => return vec![(self.held, 1.0)],
+            (_, Some(name)) => match self.ledger.label(name.as_str()) {
+                Some(label) => self.applies(label),
+                None => Vec::new(),
+            },
+            _ => Vec::new(),
+        };
+        if phrase.features.this || phrase.features.nearest {
+            let here = self.places[self.held];
+            for (p, place) in p.iter_mut().zip(&self.places) {
+                *p *= (-(place.x_m - here.x_m).hypot(place.y_m - here.y_m) / THIS_M).exp();
+            }
+            // "This hallway" is the one we are in, even if nobody named it.
+            if phrase.features.this && p.iter().all(|p| *p < GROUNDED_MIN) {
+                return vec![(self.held, 1.0)];
+            }
+        }
+        for restriction in &phrase.within {
+            self.restrict(&mut p, restriction);
+        }
+        // One landmark is meant: what applies to several is shared among them.
+        let sum = p.iter().sum::<f64>().max(1.0);
+        p.into_iter().enumerate().filter(|(_, p)| *p > 0.0).map(|(i, p)| (i, p / sum)).collect()
+    }
+
+    /// "The lounge *by the stairs*": of the places so called those that lie so, (15–16).
+    fn restrict(&self, p: &mut [f64], restriction: &Restriction) {
+        let Some(landmark) = restriction.landmarks.first().map(|l| self.landmark(l)) else { return };
+        let so = ground(restriction.relation, &self.places, self.held, &landmark, p).p;
+        for (p, so) in p.iter_mut().zip(so) {
+            *p = p.min(so);
+        }
+    }
+
+    /// P(name applies) at every place, by what other sentences said.
+    fn applies(&self, label: LabelId) -> Vec<f64> {
+        let applies = self.labels.applies_by_others(label, self.utterance);
+        (0..self.places.len() as Vertex).map(|v| applies.get(&v).copied().unwrap_or(0.0)).collect()
+    }
+}

@@ -1,0 +1,101 @@
+//! What is said, taken back, corrected and mended.
+
+use crate::world::{drive, events, laser, say};
+use crate::{run, where_is};
+use toponym_core::effects::{Effect, HeardStatus};
+use toponym_core::event::{Command, Event};
+use toponym_core::{Config, Mapper};
+
+/// A quarter of a lap with sentences (number of the scan, text, id of one taken back).
+fn told(said: &[(usize, &str, Option<&str>)]) -> Mapper {
+    let mut all = events(&drive(1)[..120], &laser(), &[]);
+    for (k, &(scan, text, retracts)) in said.iter().enumerate().rev() {
+        let stamp_ns = scan as i64 * 200_000_000;
+        let after = |e: &Event| matches!(e, Event::Scan(s) if s.stamp_ns > stamp_ns);
+        let at = all.iter().position(after).unwrap_or(all.len());
+        let mut said = say(&format!("u{k}"), text, stamp_ns);
+        said.retracts = retracts.map(Into::into);
+        all.insert(at, Event::Utterance(said));
+    }
+    let mut mapper = Mapper::new(Config::default());
+    run(&mut mapper, &all);
+    mapper.step(Event::Flush);
+    mapper
+}
+
+fn mend(mapper: &mut Mapper, command: Command) -> Result<String, String> {
+    match mapper.step(Event::Command(command)).pop() {
+        Some(Effect::Mended(done)) => done,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn undo(mapper: &mut Mapper, id: Option<&str>) -> Result<String, String> {
+    mend(mapper, Command::Undo { utterance: id.map(Into::into) })
+}
+
+fn p_is(mapper: &Mapper, name: &str) -> f64 {
+    where_is(mapper, name).candidates.first().map_or(0.0, |c| c.p_is)
+}
+
+const KITCHEN: (usize, &str, Option<&str>) = (30, "this is the kitchen", None);
+
+#[test]
+fn what_was_taken_back_was_never_said() {
+    let mut never = told(&[KITCHEN]);
+    let mut mapper =
+        told(&[KITCHEN, (60, "this is the gym", None), (90, "the lounge is near the gym", None)]);
+    assert!(undo(&mut mapper, None).unwrap().contains("lounge"));
+    assert!(undo(&mut mapper, Some("u1")).is_ok());
+    let state =
+        |m: &Mapper| (m.snapshot().labels(), m.snapshot().graph().places, m.snapshot().graph().particles);
+    assert_eq!(state(&mapper), state(&never));
+    assert_eq!(where_is(&mapper, "kitchen"), where_is(&never, "kitchen"));
+    assert!(undo(&mut mapper, Some("u1")).unwrap_err().contains("before"));
+    assert!(undo(&mut never, None).is_ok() && undo(&mut never, None).is_err());
+}
+
+#[test]
+fn a_sentence_may_take_another_back() {
+    let mapper = told(&[KITCHEN, (33, "this is the gym", Some("u0"))]);
+    assert!(p_is(&mapper, "kitchen") < 0.01 && p_is(&mapper, "gym") > 0.8);
+}
+
+#[test]
+fn a_renamed_place_is_found_by_either_name() {
+    let mut mapper = told(&[(30, "this is the jim", None)]);
+    let rename = |from: &str, to: &str| Command::Rename { from: from.into(), to: to.into() };
+    assert!(mend(&mut mapper, rename("jim", "gym")).is_ok());
+    assert!(p_is(&mapper, "gym") > 0.7 && p_is(&mapper, "jim") > 0.7);
+    assert_eq!(where_is(&mapper, "jim").candidates[0].label, "gym");
+    assert!(mend(&mut mapper, rename("nowhere", "gym")).is_err());
+    assert!(mend(&mut mapper, rename("gym", "the gym")).is_err());
+}
+
+#[test]
+fn a_forgotten_name_may_be_taught_again() {
+    let mut mapper = told(&[KITCHEN]);
+    assert!(mend(&mut mapper, Command::Forget { name: "kitchen".into() }).is_ok());
+    assert!(where_is(&mapper, "kitchen").candidates.is_empty());
+    mapper.step(Event::Utterance(say("again", "this is the kitchen", 20_000_000_000)));
+    assert!(p_is(&mapper, "kitchen") > 0.8);
+    assert!(mend(&mut mapper, Command::Forget { name: "attic".into() }).is_err());
+}
+
+#[test]
+fn a_landmark_named_later_makes_sense_of_what_was_said_before() {
+    let before = [(20, "the lounge is near the gym", None)];
+    assert!(where_is(&told(&before), "lounge").candidates.is_empty());
+    let later = told(&[before[0], (60, "this is the gym", None)]);
+    let (lounge, gym) = (where_is(&later, "lounge"), where_is(&later, "gym"));
+    assert!(lounge.candidates[0].pose.distance_m(&gym.candidates[0].pose) < 8.0);
+}
+
+#[test]
+fn an_unknown_landmark_is_told_and_kept_for_later() {
+    let mut mapper = told(&[KITCHEN]);
+    let effects = mapper.step(Event::Utterance(say("new", "the lounge is near the gym", 20_000_000_000)));
+    let Some(Effect::Heard(heard)) = effects.first() else { panic!("{effects:?}") };
+    assert_eq!(heard.status, HeardStatus::Understood);
+    assert!(heard.words.contains("I don't know of a gym yet"), "{}", heard.words);
+}
