@@ -9,7 +9,7 @@ use super::names::{Kind, Name};
 use super::noun_phrase::{Determiner, NounPhrase};
 
 // A phrase that begins another comes after it.
-const WHERE_INDIRECT: &str = "do you know where|can you tell me where|could you tell me where|tell me where|\
+const WHERE_INDIRECT: &str = "do you know where|i would like to know where|i want to know where|can you tell me where|could you tell me where|tell me where|\
     show me where|can you show me where|could you show me where|i wonder where|do you remember where|any idea where";
 const WHERE: &str = "where exactly is|where exactly are|where is|where are|where can i find|where can we find|\
     where can you find|where do i find|where do we find|where would i find|where might i find|where will i find|where was";

@@ -90,6 +90,11 @@ pub(super) fn eats(tokens: &[Token], phrases: &str) -> Option<usize> {
     })
 }
 
+/// Relations that need no landmark.
+pub(super) fn relation_alone(word: &str) -> bool {
+    is_one_of(word, "on|to|in|straight|at|behind")
+}
+
 /// Verbs of directions.
 pub(super) const MOTION: &str = "go|walk|continue|turn|take|make|follow|exit|enter|pass|head|proceed|travel|face|start|stop|\
     leave|cross|stand|keep|look|orient|bear|veer|round|move|hang|open|going|walking|turning|facing|passing|continuing|\
@@ -113,3 +118,6 @@ pub(super) const RELATIONS: &str = "with your back to|with back to|all the way t
     across from|across|around to|around|through to|through|thru|down to|down|past|passed|into|inside|towards|toward|until|till|\
     before|after|onto|along|near|next to|opposite|parallel to|ahead of|straight ahead|behind|beyond|beside|by|between|via|under|outside|\
     up|from|over|on|at|in|to";
+/// Verbs of what "you" do at a place.
+pub(super) const SEEING: &str = "see|reach|reached|get|come|enter|encounter|find|hit|pass|leave|are|'re|'ll|will|should|can|be|arrive|\
+    exit|approach|facing|have|seeing|notice|must|want|need";

@@ -7,8 +7,8 @@
 //! ```
 //! A clause without a verb of its own repeats the last one of its sentence.
 
-use super::chunks::{CONNECTIVES, COPULAS, MOTION, RELATIONS};
-use super::chunks::{Token, eats, is_one_of, tokens};
+use super::chunks::{CONNECTIVES, COPULAS, MOTION, RELATIONS, SEEING};
+use super::chunks::{Token, eats, is_one_of, relation_alone, tokens};
 use super::extents::{clause_starts, ends_landmark, verb_end};
 use std::ops::Range;
 
@@ -332,15 +332,6 @@ impl Reader<'_> {
         self.span(start, end)
     }
 }
-
-/// Relations that need no landmark.
-fn relation_alone(word: &str) -> bool {
-    is_one_of(word, "on|to|in|straight|at|behind")
-}
-
-/// Verbs of what "you" do at a place.
-const SEEING: &str = "see|reach|reached|get|come|enter|encounter|find|hit|pass|leave|are|'re|'ll|will|should|can|be|arrive|\
-    exit|approach|facing|have|seeing|notice|must|want|need";
 
 #[cfg(test)]
 mod tests {

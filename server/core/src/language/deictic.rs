@@ -92,6 +92,10 @@ impl Cursor<'_> {
         {
             return Some(Related::to(R::Near, here()));
         }
+        if self.peek(0) == "close" && matches!(self.peek(1), "" | ",") {
+            self.step();
+            return Some(Related::to(R::Near, here()));
+        }
         if self.eat_any("far away|far from here|a long way off").is_some() && self.at_break() {
             return Some(Related::to(R::AwayFrom, here()));
         }

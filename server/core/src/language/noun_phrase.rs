@@ -151,7 +151,7 @@ impl Cursor<'_> {
             ("yet another|another|a different|one more", Indefinite, Sameness::Other),
             ("the other|that other", Definite, Sameness::Other),
             ("the exact same|the very same|the same|that same|our same", Definite, Sameness::Same),
-            ("the", Definite, Sameness::Open),
+            ("both the|both|either|the", Definite, Sameness::Open),
             ("a|an|some", Indefinite, Sameness::Open),
             ("this|that|these|those", Demonstrative, Sameness::Open),
             ("our|my|your|his|her|their", Possessive, Sameness::Open),

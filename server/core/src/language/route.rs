@@ -1,7 +1,7 @@
 //! "Go down the hall until you reach the elevators, then turn left": heard and set aside, but what lies
 //! at its end is located.
 
-use super::act::Content;
+use super::act::{Content, Head};
 use super::attach::Weighed;
 use super::build::Readings;
 use super::cursor::Cursor;
@@ -58,7 +58,12 @@ fn end(at: &mut Cursor) -> Option<Weighed<Option<Content>>> {
         return None;
     }
     let readings = locate_clause(at).or_else(|| super::label::label_clause(at))?;
-    let located = |all: Vec<Content>| all.into_iter().next().filter(|c| matches!(c, Content::Locate(_)));
+    let located = |all: Vec<Content>| {
+        all.into_iter().next().filter(|c| {
+            // Where one is then is not here.
+            matches!(c, Content::Locate(locate) if locate.figure.head != Head::Here)
+        })
+    };
     readings.all.into_iter().map(|(w, all)| located(all).map(|c| (w, Some(c)))).collect()
 }
 
