@@ -1,5 +1,6 @@
 //! What a text says, typed: analyses of acts, acts of phrases. `notation.rs` has the written form.
 
+pub use super::measure::{Distance, Unit};
 use super::names::{Kind, Name};
 use super::relation::Relation;
 use serde::{Deserialize, Serialize};
@@ -169,6 +170,8 @@ pub enum Head {
 
 /// What tells a place from others of its kind.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+// Each is one word that may or may not stand there.
+#[allow(clippy::struct_excessive_bools)]
 pub struct Features {
     /// "Stata" of "the Stata cafeteria", as written.
     pub name: Option<String>,
@@ -234,42 +237,6 @@ pub struct Modifiers {
     pub distance: Option<Distance>,
     /// "Two floors up".
     pub count: Option<u32>,
-}
-
-/// A length as said.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Distance {
-    /// In its unit.
-    pub value: f64,
-    /// Its unit.
-    pub unit: Unit,
-}
-
-/// What lengths are said in.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Unit {
-    /// Metres.
-    Metre,
-    /// Feet.
-    Foot,
-    /// Yards.
-    Yard,
-    /// Steps of a walking person.
-    Step,
-}
-
-impl Distance {
-    /// In metres.
-    pub fn metres(self) -> f64 {
-        // International foot and yard; a step of an adult who walks is some 0.75 m.
-        self.value
-            * match self.unit {
-                Unit::Metre => 1.0,
-                Unit::Foot => 0.3048,
-                Unit::Yard => 0.9144,
-                Unit::Step => 0.75,
-            }
-    }
 }
 
 /// Whose left, front or way is meant.

@@ -1,6 +1,7 @@
 //! Questions. They assert nothing.
 
 use super::act::{About, Content, Head, Phrase, Question, Sameness};
+use super::attach::Chain;
 use super::build::{Readings, label, one};
 use super::cursor::Cursor;
 use super::locate::locate_clause;
@@ -8,7 +9,7 @@ use super::names::{Kind, Name};
 use super::noun_phrase::{Determiner, NounPhrase};
 
 // A phrase that begins another comes after it.
-const WHERE_INDIRECT: &str = "do you know where|can you tell me where|could you tell me where|tell me where|\
+const WHERE_INDIRECT: &str = "do you know where|i would like to know where|i want to know where|can you tell me where|could you tell me where|tell me where|\
     show me where|can you show me where|could you show me where|i wonder where|do you remember where|any idea where";
 const WHERE: &str = "where exactly is|where exactly are|where is|where are|where can i find|where can we find|\
     where can you find|where do i find|where do we find|where would i find|where might i find|where will i find|where was";
@@ -163,7 +164,7 @@ fn asked_statement(at: &mut Cursor) -> Option<Content> {
         at.skip("any|another|a second");
         let asked = at.noun_phrase().filter(|p| p.kind == Kind::Place)?;
         let chain = at.chain(false);
-        return located(at, &asked.phrase, chain);
+        return located(&asked.phrase, &chain);
     }
     if at.eat_any("this place|this room|this area|this|these|here|it|that room|that").is_some() {
         let head = if matches!(at.before(), "it") {
@@ -185,17 +186,13 @@ fn asked_statement(at: &mut Cursor) -> Option<Content> {
     }
     let figure = wanted(at).filter(|p| matches!(p.kind, Kind::Place | Kind::Open))?;
     let chain = at.chain(false);
-    located(at, &figure.phrase, chain)
+    located(&figure.phrase, &chain)
 }
 
-fn located(at: &mut Cursor, figure: &Phrase, chain: super::attach::Chain) -> Option<Content> {
+/// The figure where the likeliest reading of the chain says first.
+fn located(figure: &Phrase, chain: &Chain) -> Option<Content> {
     let (_, related) = chain.attach().into_iter().next()?;
-    let first = related.first();
-    at.skip("?");
-    match first {
-        Some(first) => Some(super::build::locate(figure, first)),
-        None => None,
-    }
+    related.first().map(|first| super::build::locate(figure, first))
 }
 
 /// The name in a question for a place: what a query asks for.

@@ -154,6 +154,9 @@ impl Chain {
 /// hall") with what lies at its end; one is told the side of a door, but not of a hallway.
 fn p_low(host: &Related, link: &Related) -> f64 {
     let Some(Head::Named(name)) = host.landmarks.last().map(|l| &l.head) else { return 0.0 };
+    if name.as_str() == "floor" {
+        return 0.0;
+    }
     let way = is_way(name.as_str());
     let door = name.as_str().ends_with("door") || name.as_str().ends_with("doors");
     match link.relation {

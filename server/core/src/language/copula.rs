@@ -10,6 +10,8 @@ const EVEN: f64 = 0.5;
 
 /// "Is probably not".
 #[derive(Clone, Copy, Debug, PartialEq)]
+// Each is one word that may or may not stand there.
+#[allow(clippy::struct_excessive_bools)]
 pub(super) struct Copula {
     pub(super) negated: bool,
     /// Probability that the speaker gives the statement.

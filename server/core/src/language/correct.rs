@@ -7,7 +7,7 @@ use super::label::{named, plausible};
 use super::locate::{located, renamed};
 
 /// Said before a clause: what was said before was wrong.
-const MARKS: &str = "no , no|no wait|no|nope|sorry|my bad|my mistake|my apologies|i was wrong about that|i was wrong|i was mistaken|\
+const MARKS: &str = "no , no|no wait|no|nope|sorry|my bad|my mistake|my apologies|forget what i said|forget that|never mind that|never mind|i was wrong about that|i was wrong|i was mistaken|\
     i am wrong|that was wrong|that is wrong|that is not right|that is not correct|that is incorrect|wrong|correction|\
     scratch that|i made a mistake|i misspoke|let me correct myself|let me correct that|i take that back|actually|\
     in fact|i meant to say|i meant|i mean|oops|wait no|wait|i should say|rather|or rather|to be precise|i stand corrected|\
@@ -39,6 +39,10 @@ pub(super) fn renaming(at: &mut Cursor) -> Option<Readings> {
         return Some(said);
     }
     *at = start;
+    if let Some(said) = wrong_about(at) {
+        return Some(said);
+    }
+    *at = start;
     at.eat_any(
         "i called this place|i called this|i said this is|i said this was|i said that this was|i told you this was|i said we were in|i thought this was")?;
     let was = named(at)?;
@@ -49,6 +53,19 @@ pub(super) fn renaming(at: &mut Cursor) -> Option<Readings> {
     let is = named(at).filter(plausible)?;
     let said = |what: Phrase| Box::new(label(Head::Here, what, Sameness::Open));
     Some(one(Content::Correct { was: Some(said(was.phrase)), is: said(is.phrase) }))
+}
+
+/// "(I was wrong) about the kitchen, it's the lounge".
+fn wrong_about(at: &mut Cursor) -> Option<Readings> {
+    if !matches!(at.before(), "wrong" | "mistaken") || !at.eat("about") {
+        return None;
+    }
+    let was = named(at)?;
+    at.skip(",|and|but");
+    at.eat_any("it is|that is|that was")?;
+    at.skip("actually|really|in fact");
+    let is = named(at).filter(plausible)?;
+    Some(Readings::new(vec![(1.0, renamed(was.phrase, is.phrase))]))
 }
 
 /// "Not the kitchen, the gym".

@@ -77,7 +77,7 @@ impl<'a> Cursor<'a> {
     }
 
     /// Steps to the next comma or the end and returns the words passed.
-    pub(super) fn to_break(&mut self) -> Vec<&'a str> {
+    pub(super) fn take_to_break(&mut self) -> Vec<&'a str> {
         let mut passed = Vec::new();
         while !self.at_break() {
             passed.push(self.peek(0));

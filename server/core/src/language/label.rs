@@ -8,7 +8,7 @@ use super::noun_phrase::{Determiner, NounPhrase};
 use super::pointed::{pointed, related_predicate, same_place};
 
 /// The place held, as people point at it.
-pub(super) const SPOT: &str = "this place here|this place|this room here|this room|this area|this space|this spot|this building|\
+pub(super) const SPOT: &str = "this place here|this over here|this one over here|this place|this room here|this room|this area|this space|this spot|this building|\
     this location|this one here|this one";
 /// "As before": the place so called is one seen before.
 const AS_BEFORE: &str = "as before|as earlier|as last time|from before|from earlier|we saw before|we saw earlier|\
@@ -23,7 +23,7 @@ const ON_FLOOR: &str = "of the building|of this building|in this building|in the
 /// Reads a clause that names a place pointed at, or says where it lies.
 pub(super) fn label_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
-    for form in [welcome, people_call, presented_here, passed, pointed, we_are] {
+    for form in [welcome, people_call, presented_here, passed, returned, pointed, we_are] {
         if let Some(readings) = form(at) {
             return Some(readings);
         }
@@ -74,6 +74,20 @@ fn presented_here(at: &mut Cursor) -> Option<Readings> {
     )?;
     let phrase = named(at).filter(plausible)?;
     Some(called(at, Head::Here, phrase, false))
+}
+
+/// "We have returned to the lobby".
+fn returned(at: &mut Cursor) -> Option<Readings> {
+    at.eat_any(
+        "we have returned to|we returned to|we have made it back to|we have got back to|we are returning to|\
+         we came back to|you have returned to|we have gone back to|we went back to|we have circled back to",
+    )?;
+    if let Some(like) = at.pointer() {
+        let start = like.head == Head::Start;
+        return start.then(|| one(Content::Same { what: Phrase::new(Head::Here), like, same: true }));
+    }
+    let phrase = named(at).filter(plausible)?;
+    Some(called(at, Head::Here, phrase, true))
 }
 
 /// "We just passed the library".
@@ -138,7 +152,16 @@ fn we_are(at: &mut Cursor) -> Option<Readings> {
         *at = start;
         (!alone && !inside).then(|| related_predicate(at, Head::Here)).flatten()
     })?;
-    Some(if denied { readings.map(negate) } else { readings })
+    // "We aren't back at the lobby": not there, be it another lobby or none.
+    Some(if denied { readings.map(plain).map(negate) } else { readings })
+}
+
+/// Without what is said of having been there before.
+fn plain(content: Content) -> Content {
+    match content {
+        Content::Label { at, what, .. } => Content::Label { at, what, sameness: Sameness::Open },
+        other => other,
+    }
 }
 
 fn been_here(same: bool) -> Content {
@@ -162,10 +185,15 @@ pub(super) fn named(at: &mut Cursor) -> Option<NounPhrase> {
         .filter(|p| matches!(p.kind, Kind::Place | Kind::Open) && p.determiner != Determiner::Demonstrative)
 }
 
+/// "The door" names no place, "the front door" does.
+fn just_a_door(phrase: &NounPhrase) -> bool {
+    !phrase.is_told() && phrase.name().is_some_and(|n| matches!(n.as_str(), "door" | "doorway" | "opening"))
+}
+
 /// A known kind of place, or any definite single thing: unknown things ("a test", "the results") name
 /// no place.
 pub(super) fn plausible(phrase: &NounPhrase) -> bool {
-    phrase.kind == Kind::Place
+    (phrase.kind == Kind::Place && !just_a_door(phrase))
         || (phrase.kind == Kind::Open && phrase.determiner == Determiner::Definite && !phrase.is_plural())
 }
 
@@ -178,7 +206,11 @@ pub(super) fn called(at: &mut Cursor, head: Head, phrase: NounPhrase, mut again:
         at.eat(",");
         if at.eat_any(AS_BEFORE).is_some() {
             again = true;
-        } else if at.pointer().is_some_and(|p| p.head == Head::Start) {
+        } else if at
+            .eat_any("we started in|we started from|we started at|we began in|that we started in")
+            .is_some()
+            || at.pointer().is_some_and(|p| p.head == Head::Start)
+        {
             start = true;
         } else {
             *at = before;

@@ -132,7 +132,8 @@ fn predicate(
     let start = *at;
     let chain = at.chain(false);
     if !chain.is_empty() && !verb.past {
-        if subjects.iter().all(|s| fits(s, false)) {
+        let kinds = subjects.iter().any(|s| s.determiner == Determiner::Indefinite) && !chain.definite;
+        if subjects.iter().all(|s| fits(s, false)) && !kinds {
             return located_told(subjects, told, &chain);
         }
         let [subject] = subjects else { return None };
@@ -224,6 +225,9 @@ fn identified(
     let at_place = |figure: &Phrase, place: &Phrase| {
         vec![super::build::locate(figure, &Related::to(R::At, place.clone()))]
     };
+    if is_door(&subject.phrase) && !subject.is_told() {
+        return None;
+    }
     let tells = !chain.is_empty() || other.phrase.features.ordinal.is_some();
     if tells && (other.kind == Kind::Vague || is_door(&other.phrase)) && subject.kind == Kind::Place {
         return pairs(&at_place);
@@ -312,8 +316,9 @@ fn fits(phrase: &NounPhrase, presented: bool) -> bool {
         Determiner::Definite => {
             known || phrase.kind == Kind::Open || (phrase.kind == Kind::Vague && phrase.is_told())
         }
-        Determiner::Indefinite => known && presented,
-        Determiner::None | Determiner::Possessive | Determiner::Demonstrative => known,
+        Determiner::None | Determiner::Indefinite | Determiner::Possessive | Determiner::Demonstrative => {
+            known
+        }
     };
     let told = phrase.is_told() && !presented;
     fits && (told || !is_door(&phrase.phrase))

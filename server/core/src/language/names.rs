@@ -4,7 +4,7 @@ use super::lexicon::{
     concept, hypernym, is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise,
     is_thing, is_weak, singular, unified,
 };
-use super::normalise::{COMMA, sentences};
+use super::normalise::{COMMA, name_words};
 use super::numbers::{is_number, numbers_as_spoken};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -37,9 +37,8 @@ pub(super) enum Kind {
 impl Name {
     /// From what a person wrote; none if no word is left ("the").
     pub fn new(text: &str) -> Option<Self> {
-        let sentence = sentences(text).into_iter().next()?;
-        let words: Vec<&str> =
-            sentence.words.iter().map(|w| w.text.as_str()).filter(|w| *w != COMMA).collect();
+        let plain = name_words(text);
+        let words: Vec<&str> = plain.iter().map(|w| w.text.as_str()).filter(|w| *w != COMMA).collect();
         Self::from_words(&words)
     }
 

@@ -26,6 +26,19 @@ pub(super) struct Sentence {
 
 /// Splits a text into sentences; nothing if it is longer than [`MAX_TEXT_BYTES`].
 pub(super) fn sentences(text: &str) -> Vec<Sentence> {
+    let mut all = split(text);
+    for sentence in &mut all {
+        sentence.words = expand(&sentence.words);
+    }
+    all
+}
+
+/// The words of a name's first sentence: what has 's is an owner there.
+pub(super) fn name_words(text: &str) -> Vec<Word> {
+    split(text).into_iter().next().map_or_else(Vec::new, |s| s.words)
+}
+
+fn split(text: &str) -> Vec<Sentence> {
     if text.len() > MAX_TEXT_BYTES {
         return Vec::new();
     }
@@ -114,7 +127,7 @@ fn finish(now: &mut Sentence, done: &mut Vec<Sentence>, question: bool) {
         now.words.pop();
     }
     if !now.words.is_empty() {
-        done.push(Sentence { words: expand(&std::mem::take(&mut now.words)), question });
+        done.push(Sentence { words: std::mem::take(&mut now.words), question });
     }
 }
 
@@ -184,11 +197,10 @@ fn contraction(word: &str) -> Option<&'static str> {
         "you'd" => "you would",
         "can't" | "cannot" | "cant" => "can not",
         "won't" | "wont" => "will not",
-        "ain't" => "is not",
         "thru" => "through",
         "ur" => "your",
         "u" => "you",
-        "isnt" => "is not",
+        "isnt" | "ain't" => "is not",
         "arent" => "are not",
         "wasnt" => "was not",
         "dont" => "do not",

@@ -135,8 +135,11 @@ pub(super) fn phrase_notation(phrase: &Phrase) -> String {
         Head::Any => "*".to_owned(),
         Head::Visited => "visited".to_owned(),
     };
-    let within: String = phrase.within.iter().map(|r| format!("[{}]", relation_notation(r))).collect();
-    format!("{head}{}{within}", braced(&features(&phrase.features)))
+    let mut text = format!("{head}{}", braced(&features(&phrase.features)));
+    for r in &phrase.within {
+        text.extend(["[", &relation_notation(r), "]"]);
+    }
+    text
 }
 
 fn features(f: &Features) -> Vec<String> {

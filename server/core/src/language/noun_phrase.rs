@@ -151,7 +151,7 @@ impl Cursor<'_> {
             ("yet another|another|a different|one more", Indefinite, Sameness::Other),
             ("the other|that other", Definite, Sameness::Other),
             ("the exact same|the very same|the same|that same|our same", Definite, Sameness::Same),
-            ("the", Definite, Sameness::Open),
+            ("both the|both|either|the", Definite, Sameness::Open),
             ("a|an|some", Indefinite, Sameness::Open),
             ("this|that|these|those", Demonstrative, Sameness::Open),
             ("our|my|your|his|her|their", Possessive, Sameness::Open),
@@ -235,7 +235,6 @@ impl Cursor<'_> {
             // "back", "next", "close" are adjectives but in these.
             "next" | "close" | "closest" | "adjacent" | "nearest" | "parallel" if next == "to" => false,
             "next" if next == "door" => false,
-            "back" if !words.is_empty() => false,
             "left" | "right"
                 if matches!(next, "of" | "before" | "after" | "past" | "behind" | "at" | "in") =>
             {
@@ -264,8 +263,8 @@ impl Cursor<'_> {
             {
                 false
             }
-            "left" | "right" if !words.is_empty() => false,
-            "north" | "south" | "east" | "west" if next == "of" || !words.is_empty() => false,
+            "back" | "left" | "right" | "north" | "south" | "east" | "west" if !words.is_empty() => false,
+            "north" | "south" | "east" | "west" if next == "of" => false,
             "once" if matches!(next, "more" | "again") => false,
             "smells" | "looks" | "lies" | "sits" | "one" | "ones" if is_place(last) && next.is_empty() => {
                 word == "one"

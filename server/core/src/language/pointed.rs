@@ -56,7 +56,8 @@ fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<R
     let start = *at;
     if at
         .eat_any(
-            "also called|also known as|also named|called|known as|named|referred to as|known to everyone as",
+            "what we call|what they call|what people call|what everyone calls|what i call|also called|also known as|\
+             also named|called|known as|named|referred to as|known to everyone as",
         )
         .is_some()
     {
@@ -76,7 +77,9 @@ fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<R
     }
     *at = start;
     let again = verb.again || at.eat_any("back").is_some();
-    at.eat_any("in|at").filter(|_| again);
+    if again {
+        at.eat_any("in|at");
+    }
     if let Some(readings) = named_predicate(at, &head, again) {
         return Some(readings);
     }
@@ -92,6 +95,10 @@ fn named_predicate(at: &mut Cursor, head: &Head, again: bool) -> Option<Readings
     let phrase = at.noun_phrase().filter(|p| p.determiner != Determiner::Demonstrative)?;
     if phrase.phrase.features.ordinal.is_some() {
         return in_a_row(at, head, &phrase);
+    }
+    if phrase.phrase.features.count.is_some() {
+        // "Two doors past the kitchen" is a place in a row, not a name.
+        return None;
     }
     if !matches!(phrase.kind, Kind::Place | Kind::Open | Kind::Vague)
         || (*head == Head::It && phrase.kind != Kind::Place)
@@ -135,11 +142,14 @@ fn in_a_row(at: &mut Cursor, head: &Head, phrase: &NounPhrase) -> Option<Reading
 pub(super) fn related_predicate(at: &mut Cursor, head: Head) -> Option<Readings> {
     let chain = at.chain(false);
     let first = chain.first()?;
-    let pointless = matches!(first.relation, R::To | R::In | R::On | R::At | R::Contains) && !chain.sure();
+    let counted = first.landmarks.iter().any(|l| l.features.count.is_some());
+    let pointless =
+        matches!(first.relation, R::To | R::In | R::On | R::At | R::Contains) && !chain.sure() && !counted;
     // "It is by the door" tells where some thing is.
-    let vague = first.landmarks.iter().any(|l| l.label().is_some()) && !chain.sure();
+    let vague = !counted && first.landmarks.iter().any(|l| l.label().is_some()) && !chain.sure();
     let door = first.landmarks.iter().all(|l| l.label().is_some_and(|n| n.as_str().ends_with("door")))
-        && first.relation != R::Through;
+        && first.relation != R::Through
+        && !counted;
     if head == Head::There || (vague && first.relation != R::Around) || pointless || door {
         return None;
     }
@@ -218,7 +228,7 @@ pub(super) fn where_kept(at: &mut Cursor) -> Option<Phrase> {
         "eat|drink|meet|work|sleep|cook|park|print|study|relax|rest|hang out|smoke|play|exercise|work out|hold|teach|\
          have|take|make|wash|wait|gather|sit|read|pick up|drop off",
     )?;
-    let rest = at.to_break();
+    let rest = at.take_to_break();
     place.features.purpose = Some([&[verb], rest.as_slice()].concat().join(" "));
     (rest.len() <= 4).then_some(place)
 }

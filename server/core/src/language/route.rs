@@ -1,7 +1,7 @@
 //! "Go down the hall until you reach the elevators, then turn left": heard and set aside, but what lies
 //! at its end is located.
 
-use super::act::Content;
+use super::act::{Content, Head};
 use super::attach::Weighed;
 use super::build::Readings;
 use super::cursor::Cursor;
@@ -33,13 +33,11 @@ pub(super) fn route_clause(at: &mut Cursor) -> Option<Readings> {
         }
         at.skip("please|just|first|then|if you|as you|when you|once you|after you|you have to|you need to|you should|\
              you can|you want to|you will want to|you|immediately");
-        match step(at).filter(|_| steps.len() < STEPS_MAX) {
-            Some(step) => steps.push(step),
-            None => {
-                *at = start;
-                break;
-            }
-        }
+        let Some(step) = step(at).filter(|_| steps.len() < STEPS_MAX) else {
+            *at = start;
+            break;
+        };
+        steps.push(step);
     }
     if steps.is_empty() {
         return None;
@@ -60,7 +58,12 @@ fn end(at: &mut Cursor) -> Option<Weighed<Option<Content>>> {
         return None;
     }
     let readings = locate_clause(at).or_else(|| super::label::label_clause(at))?;
-    let located = |all: Vec<Content>| all.into_iter().next().filter(|c| matches!(c, Content::Locate(_)));
+    let located = |all: Vec<Content>| {
+        all.into_iter().next().filter(|c| {
+            // Where one is then is not here.
+            matches!(c, Content::Locate(locate) if locate.figure.head != Head::Here)
+        })
+    };
     readings.all.into_iter().map(|(w, all)| located(all).map(|c| (w, Some(c)))).collect()
 }
 

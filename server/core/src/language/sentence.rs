@@ -79,6 +79,8 @@ fn clauses(sentence: &Sentence, mut marked: bool) -> Option<(Vec<Readings>, bool
         }
         let mut readings = next?;
         finish(&mut at, &mut readings, &mut lead)?;
+        // What says itself what it corrects needs no mark.
+        marked &= !readings.first().iter().any(|c| matches!(c, Content::Correct { .. }));
         let certainty = readings.certainty * lead.certainty;
         said.push(Readings { certainty, ..readings.map(|c| lead.shape(c, marked)) });
         marked = false;
@@ -119,6 +121,9 @@ struct Lead {
 impl Lead {
     fn read(&mut self, at: &mut Cursor) {
         loop {
+            if at.sees("everyone calls|everybody calls") {
+                return;
+            }
             if at.eat_any(AGAIN).is_some() {
                 self.again = true;
             } else if eat_mark(at) {
@@ -145,9 +150,12 @@ impl Lead {
     }
 }
 
+/// A way to read a clause.
+type Form<'f> = &'f dyn Fn(&mut Cursor) -> Option<Readings>;
+
 fn clause(at: &mut Cursor, question: bool) -> Option<Readings> {
     let start = *at;
-    let forms: [&dyn Fn(&mut Cursor) -> Option<Readings>; 6] = [
+    let forms: [Form; 6] = [
         &|at| ask_clause(at, question),
         &renaming,
         &label_clause,

@@ -5,13 +5,13 @@
 pub(super) const PLACES: &[&str] = &[
     "airport", "amphitheater", "annex", "apartment", "arboretum", "arcade", "archive", "arena",
     "aula", "bakeshop", "barn", "bathhouse", "bay", "bistro", "boathouse", "bookshop", "breezeway",
-    "buffet", "bungalow", "butcher", "cabin", "campus", "cemetery", "center", "church", "cinema",
+    "buffet", "bungalow", "butcher", "cabin", "campus", "cemetery", "church", "cinema",
     "clinic", "clubhouse", "concourse", "cottage", "court", "courthouse", "creche", "crossroads",
     "crosswalk", "cubby", "darkroom", "daycare", "deli", "dentist", "department", "dock", "dorm",
     "dormitory", "driveway", "drugstore", "factory", "farm", "ferry", "forecourt", "forest",
     "forge", "gatehouse", "gazebo", "greenhouse", "grotto", "guardhouse", "guestroom",
     "hairdresser", "hairdressers", "hangar", "headquarters", "helipad", "hospital", "hostel",
-    "hotel", "house", "hub", "hut", "infirmary", "inn", "kindergarten", "laundromat", "laundry",
+    "hotel", "hub", "hut", "infirmary", "inn", "kindergarten", "laundromat", "laundry",
     "lighthouse", "lodge", "loggia", "mall", "mansion", "marina", "market", "meadow", "mezzanine",
     "mosque", "motel", "mudroom", "newsroom", "observatory", "orchard", "outhouse", "overlook",
     "park", "parking", "parlor", "pavilion", "pergola", "pier", "playground", "plaza", "portico",
@@ -275,7 +275,7 @@ pub(super) const KEEP_S: &[&str] = &[
     "cookies", "crossroads", "dallas", "downstairs", "economics", "electronics", "gas", "glass",
     "graphics", "gymnastics", "headquarters", "kansas", "ladies", "linguistics", "logistics",
     "mathematics", "movies", "news", "oasis", "pants", "paris", "physics", "politics", "premises",
-    "robotics", "series", "stairs", "statistics", "texas", "upstairs", "vegas", "woods", "works",
+    "robotics", "series", "stairs", "statistics", "steps", "texas", "upstairs", "vegas", "woods", "works",
 ];
 /// Words in -ly that are no adverbs.
 pub(super) const LY_NOUNS: &[&str] = &[

@@ -158,9 +158,8 @@ fn asked(kind: Question, about: &About) -> String {
 
 /// A phrase as one says it: "the second door on the right".
 fn said(phrase: &Phrase) -> String {
-    let within: String = phrase.within.iter().map(|r| format!(" {}", related(r))).collect();
     let f = &phrase.features;
-    let name = match (&phrase.head, phrase.label()) {
+    let mut text = match (&phrase.head, phrase.label()) {
         (_, Some(name)) if f.ordinal.is_none() && f.count.is_none() && f.owner.is_none() => {
             name.with_article()
         }
@@ -181,7 +180,10 @@ fn said(phrase: &Phrase) -> String {
         }
         (head, _) => pointer(head).to_owned(),
     };
-    format!("{name}{within}")
+    for r in &phrase.within {
+        text.extend([" ", &related(r)]);
+    }
+    text
 }
 
 fn nth(n: u32) -> String {
@@ -221,4 +223,50 @@ fn with_indefinite(name: &Name) -> String {
         return format!("any {text}");
     }
     format!("{} {text}", if text.starts_with(['a', 'e', 'i', 'o', 'u']) { "an" } else { "a" })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::parse;
+    use super::*;
+
+    #[test]
+    fn the_guide_is_told_what_was_understood() {
+        for (text, said) in [
+            ("this is the gym", "I heard: you are in the gym."),
+            ("We're back at the gym", "I heard: you are back in the gym."),
+            ("this is another lecture hall", "I heard: you are in another lecture hall."),
+            ("this is lecture hall 123", "I heard: you are in lecture hall one twenty three."),
+            ("the lab is near the lobby", "I heard: the lab is near the lobby."),
+            (
+                "the gym is down the hall",
+                "I heard: the gym is down the hallway. I don't know of a hallway yet.",
+            ),
+            (
+                "the stairs are near the exit",
+                "I heard: the stairs are near the exit. I don't know of an exit yet.",
+            ),
+            ("where is the gym", "I heard: where is the gym?"),
+            (
+                "this is the kitchen and the lounge is next door",
+                "I heard: you are in the kitchen, and the lounge is next door.",
+            ),
+            ("I think this is the gym", "I heard: probably, you are in the gym."),
+            ("this isn't the gym", "I heard: it is not so that you are in the gym."),
+            (
+                "no, this is the gym, not the lab",
+                "I heard: you are in the gym, and not that you are in the lab.",
+            ),
+            ("it's the second door on the right", "I heard: it is at the second door on the right."),
+            (
+                "kitchens are usually near lounges",
+                "I heard: in general, the kitchen is usually near the lounge.",
+            ),
+            ("turn the lights off", "I heard an order; I only make maps. Nothing was changed."),
+            ("tralala", NOT_UNDERSTOOD),
+        ] {
+            let known = |name: &Name| matches!(name.as_str(), "lobby" | "door");
+            assert_eq!(words(parse(text).acts(), known), said);
+        }
+    }
 }

@@ -1,0 +1,88 @@
+//! Lengths and counts: "about twenty meters", "a couple of".
+
+use super::cursor::Cursor;
+use super::numbers::quantity;
+use serde::{Deserialize, Serialize};
+
+/// A length as said.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Distance {
+    /// In its unit.
+    pub value: f64,
+    /// Its unit.
+    pub unit: Unit,
+}
+
+/// What lengths are said in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Unit {
+    /// Metres.
+    Metre,
+    /// Feet.
+    Foot,
+    /// Yards.
+    Yard,
+    /// Steps of a walking person.
+    Step,
+}
+
+impl Distance {
+    /// In metres.
+    pub fn metres(self) -> f64 {
+        // International foot and yard; a step of an adult who walks is some 0.75 m.
+        self.value
+            * match self.unit {
+                Unit::Metre => 1.0,
+                Unit::Foot => 0.3048,
+                Unit::Yard => 0.9144,
+                Unit::Step => 0.75,
+            }
+    }
+}
+
+impl Cursor<'_> {
+    /// "About twenty meters".
+    pub(super) fn distance(&mut self) -> Option<Distance> {
+        let start = *self;
+        self.skip("about|approximately|around|roughly|maybe|like|nearly|almost|some|probably|another|only|just|perhaps");
+        let found = self.number().and_then(|(value, words)| {
+            self.advance(words);
+            let unit = match self
+                .eat_any("meters|metres|meter|metre|m|feet|foot|ft|yards|yard|yd|steps|step|paces|pace")?
+            {
+                "meters" | "metres" | "meter" | "metre" | "m" => Unit::Metre,
+                "feet" | "foot" | "ft" => Unit::Foot,
+                "yards" | "yard" | "yd" => Unit::Yard,
+                _ => Unit::Step,
+            };
+            Some(Distance { value, unit })
+        });
+        if found.is_none() {
+            *self = start;
+        }
+        found
+    }
+
+    /// The number here and how many words it takes.
+    pub(super) fn number(&self) -> Option<(f64, usize)> {
+        let lead = match (self.peek(0), self.peek(1), self.peek(2)) {
+            ("a", "couple", "of") => return Some((2.0, 3)),
+            ("a", "couple", _) => return Some((2.0, 2)),
+            // "A few" is three in most ears.
+            ("a", "few", _) => return Some((3.0, 2)),
+            ("a", "hundred", _) => return Some((100.0, 2)),
+            ("a", "dozen", _) => return Some((12.0, 2)),
+            ("a", ..) => return Some((1.0, 1)),
+            _ => 0,
+        };
+        // A number has at most this many words: "one hundred and twenty five".
+        let words: Vec<String> = (0..5).map(|i| self.peek(lead + i).to_owned()).collect();
+        quantity(&words, 0).map(|(n, end)| (n, end + lead))
+    }
+
+    pub(super) fn advance(&mut self, words: usize) {
+        for _ in 0..words {
+            self.step();
+        }
+    }
+}
