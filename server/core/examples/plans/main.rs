@@ -190,7 +190,9 @@ fn score(mut rooms: Vec<f64>, figures: &[usize]) -> (f64, bool) {
     if total <= 0.0 {
         return (0.0, false);
     }
-    rooms.iter_mut().for_each(|p| *p /= total);
+    for p in &mut rooms {
+        *p /= total;
+    }
     let best = (0..rooms.len()).max_by(|&a, &b| rooms[a].total_cmp(&rooms[b]));
     (figures.iter().map(|&k| rooms[k]).sum(), best.is_some_and(|k| figures.contains(&k)))
 }

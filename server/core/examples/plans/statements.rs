@@ -39,10 +39,10 @@ impl Speaker<'_> {
     }
 
     /// 1 on the left, −1 on the right, 0 at an end of the hallway.
-    fn side(&self, room: usize) -> f64 {
+    fn side(&self, room: usize) -> i32 {
         let room = &self.hall.rooms[room];
         let at_end = room.middle.0.abs() > self.hall.half_length_m;
-        if at_end { 0.0 } else { self.direction * room.door.1.signum() }
+        if at_end { 0 } else { (self.direction * room.door.1).signum() as i32 }
     }
 
     fn rooms(&self) -> impl Iterator<Item = usize> + Clone {
@@ -69,13 +69,17 @@ impl Speaker<'_> {
         };
         let of = |f: &dyn Fn(usize) -> bool| others.clone().filter(|&k| f(k)).collect::<Vec<_>>();
         say("near", Relation::Near, None, false, of(&|k| beyond(k).abs() <= 3.0));
-        let beside = of(&|k| side != 0.0 && self.neighbours(k, landmark));
+        let beside = of(&|k| side != 0 && self.neighbours(k, landmark));
         say("next to", Relation::NextTo, None, false, beside.clone());
-        let facing = of(&|k| side != 0.0 && self.side(k) == -side && beyond(k).abs() <= 1.5);
+        let facing = of(&|k| side != 0 && self.side(k) == -side && beyond(k).abs() <= 1.5);
         say("across from", Relation::AcrossFrom, None, false, facing);
         // Who looks at a room on the left has what lies further on to the right.
         let onward = |right: bool| {
-            beside.iter().copied().filter(|&k| (side * beyond(k) > 0.0) == right).collect::<Vec<_>>()
+            beside
+                .iter()
+                .copied()
+                .filter(|&k| (f64::from(side) * beyond(k) > 0.0) == right)
+                .collect::<Vec<_>>()
         };
         say("left of", Relation::LeftOf, Some(Frame::Hearer), false, onward(false));
         say("right of", Relation::RightOf, Some(Frame::Hearer), false, onward(true));
@@ -117,8 +121,8 @@ impl Speaker<'_> {
         let of = |f: &dyn Fn(usize) -> bool| rooms.clone().filter(|&k| f(k)).collect::<Vec<_>>();
         let plain = Narrowing::default();
         for (kind, here, on, relation, side) in [
-            ("on the left", Relation::LeftOf, "nth on the left", Relation::LeftSide, 1.0),
-            ("on the right", Relation::RightOf, "nth on the right", Relation::RightSide, -1.0),
+            ("on the left", Relation::LeftOf, "nth on the left", Relation::LeftSide, 1),
+            ("on the right", Relation::RightOf, "nth on the right", Relation::RightSide, -1),
         ] {
             say(kind, here, plain, of(&|k| self.side(k) == side && self.along_m(k).abs() <= 1.5));
             let mut ahead = of(&|k| self.side(k) == side && self.along_m(k) > 0.5);

@@ -54,7 +54,7 @@ pub fn read(text: &str) -> Vec<Example> {
             "objectGroundings:" => Part::Groundings,
             _ if part == Part::Command => {
                 let phrase = words.trim_start_matches(['-', ' ']);
-                last.relation = phrase.split(" the ").next().unwrap_or_default().to_owned();
+                phrase.split(" the ").next().unwrap_or_default().clone_into(&mut last.relation);
                 Part::Other
             }
             _ if part == Part::Other => part,

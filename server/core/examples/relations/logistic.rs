@@ -56,7 +56,7 @@ impl Model {
                 gradient[k] -= RIDGE * w[k];
                 hessian[k][k] += RIDGE;
             }
-            let step = solve(hessian, gradient);
+            let step = solve(hessian, &gradient);
             let largest = step.iter().fold(0.0_f64, |m, s| m.max(s.abs()));
             let scale = (STEP_MAX / largest.max(STEP_MAX)).min(1.0);
             for (w, s) in w.iter_mut().zip(step) {
@@ -79,8 +79,8 @@ fn moments(rows: &[(&[f64; FEATURES], bool)]) -> ([f64; FEATURES], [f64; FEATURE
 }
 
 /// Solves H x = g by Cholesky; of H the lower triangle is given.
-fn solve(mut h: Vec<[f64; FEATURES + 1]>, g: [f64; FEATURES + 1]) -> [f64; FEATURES + 1] {
-    let mut x = g;
+fn solve(mut h: Vec<[f64; FEATURES + 1]>, g: &[f64; FEATURES + 1]) -> [f64; FEATURES + 1] {
+    let mut x = *g;
     for i in 0..h.len() {
         for j in 0..=i {
             let dot: f64 = (0..j).map(|k| h[i][k] * h[j][k]).sum();
@@ -99,7 +99,7 @@ pub fn area_under_curve(scores: &[(f64, bool)]) -> f64 {
     let mut sorted = scores.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0));
     let (mut below, mut area) = (0.0, 0.0);
-    for tied in sorted.chunk_by(|a, b| a.0 == b.0) {
+    for tied in sorted.chunk_by(|a, b| a.0.total_cmp(&b.0).is_eq()) {
         let positive = tied.iter().filter(|s| s.1).count() as f64;
         let negative = tied.len() as f64 - positive;
         area += positive * (below + 0.5 * negative);

@@ -10,8 +10,8 @@ const GAPS: [f64; 4] = [0.13, 0.47, 0.98, 2.39];
 /// Samples round the footprint, for each gap, and in it, along and across.
 const ROUND: usize = 10;
 const INSIDE: (usize, usize) = (5, 1);
-/// Beyond so many scales there is nothing: 1 % of what is at the edge.
-const END: f64 = 4.6;
+/// Beyond so many scales there is nothing: 2 % of what is at the edge.
+const END: f64 = 3.9;
 
 /// exp(−gap/scale) round a footprint.
 pub struct Envelope {

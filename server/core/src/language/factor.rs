@@ -271,9 +271,8 @@ fn shape(scene: &Scene, relation: Relation, frame: Frame, target: Target) -> Opt
             Some(room) => (Footprint::spot(room.hinge.0, room.hinge.1, 1.5), Shape::Anywhere),
             None => (floor, Shape::Beside),
         },
-        R::NextTo => (floor, Shape::Beside),
-        // A map has no north of its own.
-        R::NorthOf | R::SouthOf | R::EastOf | R::WestOf => (floor, Shape::Beside),
+        // A map has no north of its own: beside the landmark, somewhere.
+        R::NextTo | R::NorthOf | R::SouthOf | R::EastOf | R::WestOf => (floor, Shape::Beside),
         R::At | R::In | R::On | R::Contains => (floor, Shape::Anywhere),
         R::LeftOf => cone(left(view()), SIDE_KAPPA),
         R::RightOf => cone(right(view()), SIDE_KAPPA),
@@ -293,24 +292,24 @@ fn shape(scene: &Scene, relation: Relation, frame: Frame, target: Target) -> Opt
             let other = scene.at(target.other?);
             (Footprint::strip(at, other, 1.0), Shape::Anywhere)
         }
-        R::AcrossFrom => match scene.room(target.place) {
-            Some(room) => {
-                let (x_m, y_m) = room.mirror(at);
-                (Footprint::spot(x_m, y_m, 1.0), Shape::Anywhere)
-            }
-            // Seen from the hallway: on either side of it.
-            None => {
-                let (d, m) = (left(scene.ahead), ACROSS_M);
-                let ends = ((at.0 + m * d.0, at.1 + m * d.1), (at.0 - m * d.0, at.1 - m * d.1));
-                (Footprint::strip(ends.0, ends.1, 1.0), Shape::Anywhere)
-            }
-        },
+        R::AcrossFrom => (facing(scene, target.place), Shape::Anywhere),
         R::AtEndOf => {
             let way = scene.stretch(target.place);
             let (d, half_m) = (scene.onward_along(way.axis), way.half_length_m);
             (Footprint::spot(way.x_m + half_m * d.0, way.y_m + half_m * d.1, 1.0), Shape::Anywhere)
         }
     })
+}
+
+/// The floor that faces a place over the hallway; on either side of it, if the place lies in it.
+fn facing(scene: &Scene, place: usize) -> Footprint {
+    let at = scene.at(place);
+    if let Some(room) = scene.room(place) {
+        let (x_m, y_m) = room.mirror(at);
+        return Footprint::spot(x_m, y_m, 1.0);
+    }
+    let (dx, dy) = (-ACROSS_M * scene.ahead.1, ACROSS_M * scene.ahead.0);
+    Footprint::strip((at.0 + dx, at.1 + dy), (at.0 - dx, at.1 - dy), 1.0)
 }
 
 /// Scale of the distance from the landmark's footprint.
@@ -320,9 +319,9 @@ fn reach_m(relation: Relation) -> f64 {
         R::At | R::On | R::In | R::Contains | R::To => 1.0,
         R::NextTo | R::Between | R::AcrossFrom => 1.5,
         R::Near | R::InFrontOf | R::AtEndOf | R::LeftSide | R::RightSide => 3.0,
-        R::LeftOf | R::RightOf | R::Behind | R::Across | R::Along | R::Around | R::OutOf => 4.0,
-        R::Past | R::Through => 6.0,
-        R::Down | R::AheadOf | R::Towards => 8.0,
+        R::LeftOf | R::RightOf | R::Behind | R::Across | R::Along | R::Around | R::OutOf | R::Towards => 4.0,
+        R::Past | R::Through | R::Down | R::AwayFrom => 6.0,
+        R::AheadOf => 8.0,
         _ => 15.0,
     }
 }

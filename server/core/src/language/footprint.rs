@@ -100,6 +100,7 @@ impl Footprint {
     }
 
     /// With a margin all round.
+    #[must_use]
     pub fn grown(self, margin_m: f64) -> Self {
         Self {
             half_length_m: self.half_length_m + margin_m,

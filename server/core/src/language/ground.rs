@@ -36,7 +36,7 @@ pub struct Grounding {
 }
 
 /// Landmark hypotheses summed over, per reading; the likeliest are kept.
-const MAX_LANDMARKS: usize = 6;
+const MAX_LANDMARKS: usize = 4;
 /// Readings summed over; the likeliest are kept.
 const MAX_READINGS: usize = 8;
 /// A place stands for a strip of floor this wide, and no longer than this.

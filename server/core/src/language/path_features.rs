@@ -6,7 +6,7 @@ use std::f64::consts::{PI, TAU};
 /// Numbers that describe a path beside a landmark.
 pub const FEATURES: usize = 36;
 /// Points, equally far apart on the path, that it is seen by.
-const SAMPLES: usize = 20;
+const SAMPLES: usize = 12;
 /// Where ratios are cut: a path that much longer than the landmark is simply long, and few examples
 /// would tell how long. Likewise for the logarithms of lengths, and for turns (of 180°).
 const RATIO_MAX: f64 = 1.2;
@@ -25,7 +25,7 @@ impl Samples {
         let step_m = |w: &[(f64, f64)]| norm(difference(w[1], w[0]));
         let length_m: f64 = path.windows(2).map(step_m).sum();
         let &first = path.first()?;
-        if !length_m.is_finite() || !(first.0.is_finite() && first.1.is_finite()) {
+        if !(length_m.is_finite() && first.0.is_finite() && first.1.is_finite()) {
             return None;
         }
         let mut at = [landmark.local(first.0, first.1); SAMPLES];

@@ -25,7 +25,6 @@ pub struct Ways {
     order: Vec<u32>,
     /// The first place on the way that is [`ONSET_M`] from the speaker, or the place itself.
     onset: Vec<u32>,
-    from: usize,
 }
 
 /// Not on a way, or no way.
@@ -42,7 +41,6 @@ impl Ways {
             before: vec![NONE; places.len()],
             order: Vec::new(),
             onset: (0..places.len() as u32).collect(),
-            from,
         };
         ways.walk_m[from] = 0.0;
         // Distances are not negative, so their bits are in order.
