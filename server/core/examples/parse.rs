@@ -1,12 +1,12 @@
 //! Reads sentences from standard input, one a line, and prints what each says, as JSON:
-//! `{"text": "this is the gym", "parse": "label(here,gym)"}`.
+//! `{"text": "this is the gym", "parse": "label(here,gym)", "words": "I heard: …", "analyses": [[0.9, …]]}`.
 //!
 //! `--score FILE` reads lines `{"level": 1, "text": …, "parse": …}` instead, prints each that is read
 //! otherwise, and the share read exactly per level.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};
-use toponym_core::language::parse;
+use toponym_core::language::{parse, words};
 
 fn main() -> io::Result<()> {
     let mut arguments = std::env::args().skip(1);
@@ -26,7 +26,12 @@ fn read() -> io::Result<()> {
         writeln!(
             out,
             "{}",
-            serde_json::json!({ "text": text, "parse": parse.notation(), "analyses": others })
+            serde_json::json!({
+                "text": text,
+                "parse": parse.notation(),
+                "words": words(parse.acts(), |_| true),
+                "analyses": others,
+            })
         )?;
     }
     Ok(())

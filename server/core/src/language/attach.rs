@@ -69,6 +69,11 @@ impl Cursor<'_> {
 const COPULA: &str = "is|are|you|there|we";
 
 impl Chain {
+    /// "Here".
+    pub(super) fn here() -> Self {
+        Self { definite: true, links: vec![(Related::to(R::At, Phrase::new(Head::Here)), false)] }
+    }
+
     pub(super) fn is_empty(&self) -> bool {
         self.links.is_empty()
     }

@@ -1,7 +1,7 @@
 //! "The gym is down the hall", "on your left you'll see the lab": a figure and where it lies; and what
 //! else is said of a place by name.
 
-use super::act::{Content, Head, Owner, Phrase, Sameness};
+use super::act::{Content, Head, Locate, Owner, Phrase, Sameness};
 use super::attach::{Chain, Weighed};
 use super::build::{Readings, label, locate_all, negate, one, shaped};
 use super::copula::Copula;
@@ -52,7 +52,8 @@ fn presented(at: &mut Cursor) -> Option<Readings> {
     at.skip("actually|also|probably|even|only|just");
     let none = at.eat_any("no|not a|not any|no other").is_some();
     let figures = figures(at, true)?;
-    let chain = at.chain(false);
+    let here = at.eat_any("right here|in here|here|in this room").is_some() && at.at_break();
+    let chain = if here { Chain::here() } else { at.chain(false) };
     // "You have a kitchen" says nothing; "there is a room" neither.
     let readings = located(&figures, &chain)?;
     let denies = none ^ (verb == "there used to be");
@@ -350,7 +351,10 @@ fn located_told(figures: &[NounPhrase], told: &[Weighed<Phrase>], chain: &Chain)
 pub(super) fn said_further(at: &mut Cursor, first: &Content) -> Option<Readings> {
     let phrase = match first {
         Content::Label { what, .. } => what.clone(),
-        Content::Locate(locate) => locate.figure.clone(),
+        // "The office is next to the lab, which is past the kitchen": the lab is.
+        Content::Locate(Locate { figure, landmarks, .. }) => {
+            landmarks.last().filter(|l| matches!(l.head, Head::Named(_))).unwrap_or(figure).clone()
+        }
         _ => return None,
     };
     let subject = NounPhrase {

@@ -59,7 +59,9 @@ fn clause(content: &Content) -> String {
         Content::Attribute { what, value } => format!("{} {} {value}", said(what), verb(what)),
         Content::Negate(inner) => format!("it is not so that {}", clause(inner)),
         Content::Correct { was: None, is } => format!("{}, whatever was said before", clause(is)),
-        Content::Correct { was: Some(was), is } => format!("{}, and not that {}", clause(is), clause(was)),
+        Content::Correct { was: Some(was), is } => {
+            format!("{}, and it is not so that {}", clause(is), clause(was))
+        }
         Content::Same { what, like, same } => {
             let how = if *same { "the same place as" } else { "another place than" };
             format!("{} {} {how} {}", said(what), verb(what), said(like))
@@ -97,6 +99,9 @@ fn located(locate: &Locate) -> String {
         modifiers: locate.modifiers,
         landmarks: locate.landmarks.clone(),
     });
+    if locate.figure.head == Head::Here {
+        return format!("you are {place}");
+    }
     let guess = if locate.repaired { ", if I heard the name right" } else { "" };
     format!("{} {} {place}{guess}", said(&locate.figure), verb(&locate.figure))
 }
@@ -116,24 +121,26 @@ fn related(r: &Restriction) -> String {
         words.push(format!("{} {unit}", d.value));
     }
     if let Some(n) = r.modifiers.count {
-        words.push(format!("{n} levels"));
+        words.push(format!("{n} floors"));
     }
     let landmarks: Vec<String> = r.landmarks.iter().map(said).collect();
     words.push(fixed(r).unwrap_or_else(|| format!("{} {}", r.relation.words(), landmarks.join(" and "))));
     words.join(" ")
 }
 
-/// Relations that are said without "the landmark".
+/// Relations that are said without "the landmark"; who was spoken to is now the one who speaks.
 fn fixed(r: &Restriction) -> Option<String> {
     let head = &r.landmarks.first()?.head;
     let text = match (r.relation, head) {
         (Relation::LeftSide, Head::Path) => "on the left",
         (Relation::RightSide, Head::Path) => "on the right",
-        (Relation::LeftOf, Head::Agent) => "on your left",
-        (Relation::RightOf, Head::Agent) => "on your right",
-        (Relation::LeftOf, Head::Speaker) => "on my left",
-        (Relation::RightOf, Head::Speaker) => "on my right",
+        (Relation::LeftOf, Head::Agent) => "on my left",
+        (Relation::RightOf, Head::Agent) => "on my right",
+        (Relation::LeftOf, Head::Speaker) => "on your left",
+        (Relation::RightOf, Head::Speaker) => "on your right",
         (Relation::AheadOf, Head::Agent) => "straight ahead",
+        (Relation::LevelUp, Head::Here) if r.modifiers.count.is_some() => "up",
+        (Relation::LevelDown, Head::Here) if r.modifiers.count.is_some() => "down",
         (Relation::LevelUp, Head::Here) => "upstairs",
         (Relation::LevelDown, Head::Here) => "downstairs",
         (Relation::NextTo, Head::Here) => "next door",
@@ -165,18 +172,23 @@ fn said(phrase: &Phrase) -> String {
         }
         (Head::Named(kind), label) => {
             let owner = match &f.owner {
-                Some(Owner::Speaker) => "my ",
+                Some(Owner::Speaker) => "your ",
                 Some(Owner::Named(_)) => "",
                 None => "the ",
             };
             let nth = match f.ordinal {
-                Some(Ordinal::Nth(n)) => format!("{} ", nth(n)),
-                Some(Ordinal::Last) => "last ".to_owned(),
-                Some(Ordinal::Next) => "next ".to_owned(),
+                Some(which) => ordinal(which) + " ",
                 None => f.count.map_or_else(String::new, |n| format!("{} ", nth(n))),
             };
             let name = label.as_ref().map_or(kind.as_str(), Name::as_str);
             format!("{owner}{nth}{name}")
+        }
+        (Head::Place, _) if f.purpose.is_some() => {
+            format!("the place where people {}", f.purpose.as_deref().unwrap_or_default())
+        }
+        (Head::Place, _) => {
+            let nth = f.ordinal.map_or(String::new(), |o| ordinal(o) + " ");
+            format!("the {nth}{}", if nth.is_empty() { "place" } else { "one" })
         }
         (head, _) => pointer(head).to_owned(),
     };
@@ -184,6 +196,14 @@ fn said(phrase: &Phrase) -> String {
         text.extend([" ", &related(r)]);
     }
     text
+}
+
+fn ordinal(which: Ordinal) -> String {
+    match which {
+        Ordinal::Nth(n) => nth(n),
+        Ordinal::Last => "last".to_owned(),
+        Ordinal::Next => "next".to_owned(),
+    }
 }
 
 fn nth(n: u32) -> String {
@@ -197,8 +217,8 @@ fn pointer(head: &Head) -> &'static str {
         Head::Here => "here",
         Head::There => "that place",
         Head::It => "it",
-        Head::Agent => "you",
-        Head::Speaker => "me",
+        Head::Agent => "me",
+        Head::Speaker => "you",
         Head::Path => "the way",
         Head::Previous => "the place we just left",
         Head::Start => "where we started",
@@ -255,7 +275,7 @@ mod tests {
             ("this isn't the gym", "I heard: it is not so that you are in the gym."),
             (
                 "no, this is the gym, not the lab",
-                "I heard: you are in the gym, and not that you are in the lab.",
+                "I heard: you are in the gym, and it is not so that you are in the lab.",
             ),
             ("it's the second door on the right", "I heard: it is at the second door on the right."),
             (
