@@ -191,6 +191,8 @@ impl Cursor<'_> {
                     | R::Past
                     | R::Across
                     | R::At
+                    | R::Above
+                    | R::Below
                     | R::NorthOf
                     | R::SouthOf
                     | R::EastOf
@@ -204,6 +206,11 @@ impl Cursor<'_> {
         if pointless || upward {
             return None;
         }
+        // "The lounge is below us" is below here.
+        let first = match (relation, &first.head) {
+            (R::Above | R::Below, Head::Agent | Head::Speaker) => Phrase::new(Head::Here),
+            _ => first,
+        };
         let mut landmarks = vec![first];
         if relation == R::Between {
             if self.eat("and") {
