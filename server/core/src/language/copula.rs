@@ -73,7 +73,7 @@ impl Cursor<'_> {
 
     fn adverbs(&mut self, c: &mut Copula) {
         loop {
-            if self.sees("not far|not too far") {
+            if self.sees("not far|not too far|all the way") {
                 return;
             }
             if self.eat_any("no longer|not anymore").is_some() {

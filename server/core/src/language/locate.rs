@@ -231,7 +231,10 @@ fn identified(
         return None;
     }
     let tells = !chain.is_empty() || other.phrase.features.ordinal.is_some();
-    if tells && (other.kind == Kind::Vague || is_door(&other.phrase)) && subject.kind == Kind::Place {
+    if tells
+        && (other.kind == Kind::Vague || is_door(&other.phrase))
+        && matches!(subject.kind, Kind::Place | Kind::Open)
+    {
         return pairs(&at_place);
     }
     let names = other.kind == Kind::Place || (other.kind == Kind::Open && plausible(&other));

@@ -97,7 +97,7 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ("right of", R::RightOf),
 ];
 /// Says nothing that we use.
-const ADVERBS: &str = "located|situated|found|placed|all the way|way|back|out|over|up|further|farther|a bit|a little|\
+const ADVERBS: &str = "located|situated|found|placed|halfway|partway|midway|all the way|way|back|out|over|up|further|farther|a bit|a little|\
     somewhere|still|also|both|all|tucked away|somewhere over|hidden|immediately adjacent|very|really|pretty|quite|\
     straight|not far|standing";
 

@@ -110,6 +110,8 @@ fn what_lies_nowhere_on_a_map_asserts_nothing() {
         "sales are through the roof",
         "the truth is far from here",
         "the party is next door",
+        "the sandwich is cold",
+        "the zorb is my favourite",
         "the gym is down here",
         "the gym is near the gym",
         "there is a lamp on the desk",
