@@ -12,6 +12,9 @@ pub struct Config {
     pub seed: u64,
     /// Whether sentences are listened to at all.
     pub language: bool,
+    /// Whether sentences are taken in by the paper's own rules: names and plain relations, grounded once by
+    /// σ(−d / 30 m); no weights, no second thoughts. For comparison.
+    pub paper_language: bool,
     /// Whether names propose edges, eqs. (8–9).
     pub semantic_edges: bool,
     /// Whether older places are looked at at all: without, the map is the front end's.
@@ -32,6 +35,7 @@ impl Default for Config {
             particles: 30,
             seed: 1,
             language: true,
+            paper_language: false,
             semantic_edges: true,
             loops: true,
             inject_loops: 0.0,

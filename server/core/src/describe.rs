@@ -5,8 +5,8 @@ use crate::filter::Filter;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::{Evidence, LabelId, Labels, Source};
-use crate::language::act::{Head, Locate, Parse, Phrase, Restriction};
-use crate::language::{GroundPlace, ground};
+use crate::language::act::{Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
+use crate::language::{GroundPlace, LandmarkBelief, Narrowing, Reading, ground_by_paper, ground_clause};
 use crate::ledger::Ledger;
 use crate::listen::locates;
 use crate::particle::Particle;
@@ -40,7 +40,7 @@ impl Filter {
         for name in &figures {
             ledger.enter_name(name);
         }
-        let ledger = &self.ledger;
+        let (ledger, by_paper) = (&self.ledger, self.config.paper_language);
         self.particles.par_iter_mut().for_each(|p| {
             let scene = Scene {
                 places: places(&poses(p), path_m),
@@ -48,6 +48,7 @@ impl Filter {
                 ledger,
                 utterance,
                 held: held as usize,
+                by_paper,
             };
             let grounded = scene.grounded(parse);
             p.labels.reground(utterance, &grounded);
@@ -69,6 +70,9 @@ impl Filter {
     }
 
     fn reground_some(&mut self, utterances: &[u32]) {
+        if self.config.paper_language {
+            return;
+        }
         let path_m: Vec<f64> = self.graph.places().iter().map(|p| p.path_m).collect();
         for &utterance in utterances {
             let entry = &self.ledger.entries()[utterance as usize];
@@ -87,6 +91,9 @@ impl Filter {
         poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
         path_m: &[f64],
     ) {
+        if self.config.paper_language {
+            return;
+        }
         let speaks =
             |p: &Phrase| p.label().is_some_and(|name| self.ledger.label(name.as_str()) == Some(label));
         let about = |l: &Locate| speaks(&l.figure) || l.landmarks.iter().any(speaks);
@@ -112,37 +119,64 @@ struct Scene<'a> {
     ledger: &'a Ledger,
     utterance: u32,
     held: usize,
+    by_paper: bool,
 }
 
 impl Scene<'_> {
-    /// Δα of all that a sentence locates, over its readings.
+    /// Δα of all that a sentence locates: for each figure a clause, summed over its readings.
     fn grounded(&self, parse: &Parse) -> Vec<Evidence> {
-        let mut sums: BTreeMap<(LabelId, Vertex), f64> = BTreeMap::new();
+        let mut clauses: BTreeMap<LabelId, Vec<(f64, &Locate)>> = BTreeMap::new();
         for (certainty, l) in locates(parse) {
-            let Some(said) = l.figure.label().and_then(|name| self.ledger.said(name.as_str())) else {
-                continue;
-            };
-            let label = self.ledger.meant(said);
-            if !self.ledger.speaks_of(self.utterance, label) {
-                continue;
-            }
-            let p = self.place_of(l, Some(label));
-            for (v, p) in p.iter().enumerate().filter(|(_, p)| **p >= GROUNDED_MIN) {
-                *sums.entry((said, v as Vertex)).or_insert(0.0) += certainty * p;
+            let said = l.figure.label().and_then(|name| self.ledger.said(name.as_str()));
+            if let Some(said) = said.filter(|&s| self.ledger.speaks_of(self.utterance, self.ledger.meant(s)))
+            {
+                clauses.entry(said).or_default().push((certainty, l));
             }
         }
-        let evidence = |((said, place), weight)| {
-            let (utterance, label) = (self.utterance, self.ledger.meant(said));
-            Evidence { utterance, said, label, place, weight, source: Source::Grounded }
-        };
-        sums.into_iter().map(evidence).collect()
+        let mut grounded = Vec::new();
+        for (said, readings) in clauses {
+            let label = self.ledger.meant(said);
+            let certainty = readings.iter().map(|r| r.0).sum::<f64>().min(1.0);
+            let p = self.place_of(&readings, label);
+            grounded.extend(p.iter().enumerate().filter(|(_, p)| *p * certainty >= GROUNDED_MIN).map(
+                |(v, p)| {
+                    let (utterance, place, weight) = (self.utterance, v as Vertex, certainty * p);
+                    Evidence { utterance, said, label, place, weight, source: Source::Grounded }
+                },
+            ));
+        }
+        grounded
     }
 
-    /// p(figure is place i | λ), eq. (14).
-    fn place_of(&self, l: &Locate, figure: Option<LabelId>) -> Vec<f64> {
-        let landmark = l.landmarks.first().map_or_else(Vec::new, |p| self.landmark(p));
-        let prior = figure.map_or_else(Vec::new, |figure| self.applies(figure));
-        ground(l.relation, &self.places, self.held, &landmark, &prior).p
+    /// p(figure is place i | λ), eq. (14), given what is located as its readings say.
+    fn place_of(&self, clause: &[(f64, &Locate)], figure: LabelId) -> Vec<f64> {
+        let landmarks: Vec<Vec<Vec<(usize, f64)>>> = clause
+            .iter()
+            .map(|(_, l)| l.landmarks.iter().map(|phrase| self.landmark(phrase)).collect())
+            .collect();
+        if self.by_paper {
+            let of_first = landmarks[0].first().into_iter().flatten();
+            let likeliest = of_first.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
+            return ground_by_paper(clause[0].1.relation, &self.places, likeliest.map(|l| l.0));
+        }
+        let beliefs: Vec<Vec<LandmarkBelief>> = clause
+            .iter()
+            .zip(&landmarks)
+            .map(|((_, l), of)| l.landmarks.iter().zip(of).map(|(p, places)| belief(p, places)).collect())
+            .collect();
+        let whole = clause.iter().map(|r| r.0).sum::<f64>().max(f64::MIN_POSITIVE);
+        let readings: Vec<Reading> = clause
+            .iter()
+            .zip(&beliefs)
+            .map(|((certainty, l), landmarks)| Reading {
+                weight: certainty / whole,
+                relation: l.relation,
+                frame: l.frame,
+                narrowing: narrowing(&l.modifiers, l.landmarks.first()),
+                landmarks,
+            })
+            .collect();
+        ground_clause(&readings, &self.places, self.held, &self.applies(figure)).p
     }
 
     /// Where a landmark may be: (place, probability), summing to at most one; empty if nobody knows.
@@ -175,8 +209,13 @@ impl Scene<'_> {
 
     /// "The lounge *by the stairs*": of the places so called those that lie so, (15–16).
     fn restrict(&self, p: &mut [f64], restriction: &Restriction) {
-        let Some(landmark) = restriction.landmarks.first().map(|l| self.landmark(l)) else { return };
-        let so = ground(restriction.relation, &self.places, self.held, &landmark, p).p;
+        let places: Vec<Vec<(usize, f64)>> = restriction.landmarks.iter().map(|l| self.landmark(l)).collect();
+        let landmarks: Vec<LandmarkBelief> =
+            restriction.landmarks.iter().zip(&places).map(|(phrase, of)| belief(phrase, of)).collect();
+        let narrowing = narrowing(&restriction.modifiers, restriction.landmarks.first());
+        let (relation, frame) = (restriction.relation, None);
+        let reading = Reading { weight: 1.0, relation, frame, narrowing, landmarks: &landmarks };
+        let so = ground_clause(&[reading], &self.places, self.held, p).p;
         for (p, so) in p.iter_mut().zip(so) {
             *p = p.min(so);
         }
@@ -187,4 +226,21 @@ impl Scene<'_> {
         let applies = self.labels.applies_by_others(label, self.utterance);
         (0..self.places.len() as Vertex).map(|v| applies.get(&v).copied().unwrap_or(0.0)).collect()
     }
+}
+
+/// A landmark's places, and whether it is one that one goes along.
+fn belief<'a>(phrase: &Phrase, places: &'a [(usize, f64)]) -> LandmarkBelief<'a> {
+    let way = phrase.head == Head::Path || phrase.label().is_some_and(|name| name.is_way());
+    LandmarkBelief { places, way }
+}
+
+/// "Just", "twenty meters", "the second door".
+fn narrowing(modifiers: &Modifiers, landmark: Option<&Phrase>) -> Narrowing {
+    let features = landmark.map(|p| &p.features);
+    let nth = features.and_then(|f| match f.ordinal {
+        Some(Ordinal::Nth(n)) => Some(n),
+        _ => f.count,
+    });
+    let distance_m = modifiers.distance.map(Distance::metres);
+    Narrowing { just: modifiers.just, distance_m, doors: nth.or(modifiers.count) }
 }

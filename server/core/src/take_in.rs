@@ -39,6 +39,9 @@ impl Filter {
     }
 
     fn take(&mut self, saying: &Saying, content: &Content, certainty: f64, likeliest: bool) {
+        if self.config.paper_language && !matches!(content, Content::Label { .. }) {
+            return;
+        }
         match content {
             Content::Label { at, what, sameness } => self.call(saying, at, what, *sameness, certainty),
             Content::Alias { what, also } if likeliest => self.alias(saying, what, also),
@@ -62,7 +65,9 @@ impl Filter {
         let evidence = Evidence { utterance, said, label, place, weight: DIRECT * certainty, source };
         for p in &mut self.particles {
             let log = log_label(&p.labels, &(here.poses)(p), (place, label), sameness, p0);
-            p.weigh_by_words(utterance, certainty * log);
+            if !self.config.paper_language {
+                p.weigh_by_words(utterance, certainty * log);
+            }
             p.labels.add(evidence);
         }
         self.reground_about(label, saying.here.poses, &saying.here.path_m);

@@ -5,6 +5,16 @@ use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use toponym_core::Config;
 
+/// Rules by which sentences are taken in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+pub enum Preset {
+    /// All that is understood, grounded again as the map grows
+    #[default]
+    Toponym,
+    /// The paper's own, for comparison: names and plain relations, grounded once by σ(−d / 30 m)
+    Paper,
+}
+
 /// Map a recorded log and answer questions about it.
 #[derive(Clone, Debug, clap::Args)]
 #[command(after_help = "Example:\n  toponym-server map tour.clf.gz --narration tour.jsonl \\\n    \
@@ -27,6 +37,9 @@ pub struct MapArgs {
     /// Do not listen to sentences
     #[arg(long, conflicts_with = "start_map")]
     pub no_language: bool,
+    /// Whose rules sentences are taken in by
+    #[arg(long, value_name = "RULES", value_enum, default_value_t, conflicts_with = "start_map")]
+    pub preset: Preset,
     /// Names propose no loop edges
     #[arg(long, conflicts_with = "start_map")]
     pub no_semantic_edges: bool,
@@ -81,6 +94,7 @@ impl MapArgs {
             particles: self.particles.unwrap_or(defaults.particles),
             seed: self.seed.unwrap_or(defaults.seed),
             language: !self.no_language,
+            paper_language: self.preset == Preset::Paper,
             semantic_edges: !self.no_semantic_edges,
             loops: !self.no_loops,
             inject_loops: self.inject_loops.unwrap_or(defaults.inject_loops),

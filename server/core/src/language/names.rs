@@ -2,7 +2,7 @@
 
 use super::lexicon::{
     concept, hypernym, is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise,
-    is_thing, is_weak, singular, unified,
+    is_thing, is_way, is_weak, singular, unified,
 };
 use super::normalise::{COMMA, name_words};
 use super::numbers::{is_number, numbers_as_spoken};
@@ -60,6 +60,12 @@ impl Name {
     /// lab.
     pub fn hypernym(&self) -> Option<&str> {
         hypernym(&self.0).or_else(|| self.0.split_once(' ').and_then(|(_, last)| concept(last).map(|_| last)))
+    }
+
+    /// Whether it names what one goes along: a hallway, a ramp.
+    pub fn is_way(&self) -> bool {
+        let words: Vec<&str> = self.0.split(' ').collect();
+        head(&words).is_some_and(|at| is_way(words[at]))
     }
 
     /// What speaks for it being a place's name.

@@ -7,7 +7,7 @@ use toponym_core::event::{Command, Event};
 use toponym_core::{Config, Mapper};
 
 /// A quarter of a lap with sentences (number of the scan, text, id of one taken back).
-fn told(said: &[(usize, &str, Option<&str>)]) -> Mapper {
+fn told_by(config: Config, said: &[(usize, &str, Option<&str>)]) -> Mapper {
     let mut all = events(&drive(1)[..120], &laser(), &[]);
     for (k, &(scan, text, retracts)) in said.iter().enumerate().rev() {
         let stamp_ns = scan as i64 * 200_000_000;
@@ -17,10 +17,14 @@ fn told(said: &[(usize, &str, Option<&str>)]) -> Mapper {
         said.retracts = retracts.map(Into::into);
         all.insert(at, Event::Utterance(said));
     }
-    let mut mapper = Mapper::new(Config::default());
+    let mut mapper = Mapper::new(config);
     run(&mut mapper, &all);
     mapper.step(Event::Flush);
     mapper
+}
+
+fn told(said: &[(usize, &str, Option<&str>)]) -> Mapper {
+    told_by(Config::default(), said)
 }
 
 fn mend(mapper: &mut Mapper, command: Command) -> Result<String, String> {
@@ -98,4 +102,41 @@ fn an_unknown_landmark_is_told_and_kept_for_later() {
     let Some(Effect::Heard(heard)) = effects.first() else { panic!("{effects:?}") };
     assert_eq!(heard.status, HeardStatus::Understood);
     assert!(heard.words.contains("I don't know of a gym yet"), "{}", heard.words);
+}
+
+#[test]
+fn a_correction_takes_back_exactly_what_it_corrects() {
+    let corrected = told(&[KITCHEN, (33, "no, this is the gym, not the kitchen", None)]);
+    assert!(where_is(&corrected, "kitchen").candidates.is_empty());
+    assert!(p_is(&corrected, "gym") > 0.7);
+    // By the paper's rules nothing is taken back.
+    let paper = Config { paper_language: true, ..Config::default() };
+    let mapper = told_by(paper, &[KITCHEN, (33, "no, this is the gym, not the kitchen", None)]);
+    assert!(p_is(&mapper, "kitchen") > 0.7);
+}
+
+#[test]
+fn what_is_denied_is_not_so() {
+    let denied = told(&[KITCHEN, (33, "this is not the kitchen", None)]);
+    assert!(p_is(&denied, "kitchen") < 0.3, "{}", p_is(&denied, "kitchen"));
+}
+
+#[test]
+fn doubt_makes_a_name_less_sure() {
+    let sure = p_is(&told(&[KITCHEN]), "kitchen");
+    let doubted = p_is(&told(&[(30, "I think this is the kitchen", None)]), "kitchen");
+    assert!(0.2 < doubted && doubted < sure - 0.02, "{doubted} {sure}");
+}
+
+#[test]
+fn another_name_of_a_place_is_understood() {
+    let mapper = told(&[KITCHEN, (60, "the kitchen is also called the galley", None)]);
+    assert!(p_is(&mapper, "galley") > 0.7);
+}
+
+#[test]
+fn the_papers_rules_ground_once() {
+    let said = [(20, "the lounge is near the gym", None), (60, "this is the gym", None)];
+    let paper = Config { paper_language: true, ..Config::default() };
+    assert!(where_is(&told_by(paper, &said), "lounge").candidates.is_empty());
 }
