@@ -50,7 +50,7 @@ impl Cursor<'_> {
         let verb = self.eat_any(
             "is going to be|are going to be|used to be|has always been|will not be|will probably be|will be|would be|\
              should not be|should be|shall be|must be|has to be|have to be|might not be|might be|may not be|may be|\
-             could be|can be found|can be|is located|are located|is situated|are situated|seems to be|seem to be|\
+             could be|can be found|can be reached|is reached|are reached|can be|is located|are located|is situated|are situated|seems to be|seem to be|\
              appears to be|looks to be|looks like|sits|lies|stands|comes|come|is|are|am|was|were",
         );
         let Some(verb) = verb else {
@@ -73,7 +73,7 @@ impl Cursor<'_> {
 
     fn adverbs(&mut self, c: &mut Copula) {
         loop {
-            if self.sees("not far|not too far") {
+            if self.sees("not far|not too far|all the way") {
                 return;
             }
             if self.eat_any("no longer|not anymore").is_some() {

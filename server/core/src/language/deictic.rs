@@ -11,7 +11,7 @@ use super::relation::Relation as R;
 impl Cursor<'_> {
     /// "On your left", "to the right of the stairs", "on the left side of the hallway".
     pub(super) fn side(&mut self) -> Option<Related> {
-        self.skip("off|over|up|immediately");
+        self.skip("off|over|up|immediately|down and|up and|back and|around and|along and");
         if let Some(way) = self.eat_any("to the north|to the south|to the east|to the west") {
             let relation = match way {
                 "to the north" => R::NorthOf,
@@ -91,6 +91,12 @@ impl Cursor<'_> {
             .is_some()
         {
             return Some(Related::to(R::Near, here()));
+        }
+        if self
+            .eat_any("down the hall from here|down the hallway from here|down the corridor from here|up the hall from here")
+            .is_some()
+        {
+            return Some(Related::to(R::Down, Phrase::new(Head::Named(Name::new("hallway")?))));
         }
         if self.peek(0) == "close" && matches!(self.peek(1), "" | ",") {
             self.step();

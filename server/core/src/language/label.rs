@@ -224,8 +224,10 @@ pub(super) fn called(at: &mut Cursor, head: Head, phrase: NounPhrase, mut again:
         return Readings::new(vec![(1.0, vec![label(head, phrase.phrase, Sameness::Open), same])]);
     }
     let chain = at.chain(true);
-    let mine = |h: &Head| matches!(h, Head::Agent | Head::Speaker | Head::Path);
-    if head == Head::Here && chain.first().is_some_and(|r| r.landmarks.iter().any(|l| mine(&l.head))) {
+    let mine = |h: &Head| matches!(h, Head::Agent | Head::Speaker | Head::Path | Head::There);
+    if matches!(head, Head::Here | Head::There)
+        && chain.first().is_some_and(|r| r.landmarks.iter().any(|l| mine(&l.head)))
+    {
         // "Here is the kitchen on your left" locates it.
         return locate_all(&[vec![(1.0, phrase.phrase)]], &chain.attach());
     }

@@ -45,6 +45,8 @@ impl Cursor<'_> {
         );
         self.skip("from");
         let from = self.landmark().map_or_else(|| Phrase::new(Head::Here), |(phrase, _)| phrase);
+        let me = matches!(from.head, Head::Agent | Head::Speaker);
+        let from = if me { Phrase::new(Head::Here) } else { from };
         let count = (n > 1.0).then_some(n as u32);
         Some(by_levels(up, count, from))
     }

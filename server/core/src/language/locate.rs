@@ -21,7 +21,7 @@ const MAX_FIGURES: usize = 4;
 const PRESENT: &str = "there is also|there are also|there is|there are|there will be|there should be|there used to be|\
     we also have|we have got|we have|you have got|you have|you will find|you can find|you find|you will see|you can see|\
     you see|we find|you will come to|you will be able to see|you should see|you should find|we will find|we will see|\
-    you will also find|you can also find|you will also see|you will pass|we have also got";
+    you can get to|you get to|you can reach|you reach|we will pass|we pass|you pass|you will also find|you can also find|you will also see|you will pass|we have also got";
 
 /// Reads a clause that locates something.
 pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
@@ -62,7 +62,7 @@ fn presented(at: &mut Cursor) -> Option<Readings> {
 
 /// "Just past the entrance is the reception desk".
 fn inverted(at: &mut Cursor) -> Option<Readings> {
-    at.skip("here|over here|up here|down here");
+    at.skip("here|over here|up here|down here|coming up|next up");
     let chain = at.leading_chain();
     chain.first()?;
     at.skip(",");
@@ -156,6 +156,7 @@ fn predicate(
     if !matches!(subject.kind, Kind::Place | Kind::Vague | Kind::Open)
         || subject.determiner == Determiner::Indefinite
         || (subject.kind != Kind::Place && !subject.is_told() && !subject.phrase.features.this)
+        || (subject.kind == Kind::Open && subject.determiner != Determiner::Definite)
     {
         return None;
     }
@@ -230,7 +231,10 @@ fn identified(
         return None;
     }
     let tells = !chain.is_empty() || other.phrase.features.ordinal.is_some();
-    if tells && (other.kind == Kind::Vague || is_door(&other.phrase)) && subject.kind == Kind::Place {
+    if tells
+        && (other.kind == Kind::Vague || is_door(&other.phrase))
+        && matches!(subject.kind, Kind::Place | Kind::Open)
+    {
         return pairs(&at_place);
     }
     let names = other.kind == Kind::Place || (other.kind == Kind::Open && plausible(&other));

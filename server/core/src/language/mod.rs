@@ -11,6 +11,9 @@
 //!                               └ attach: readings of "the office near the lounge by the stairs"
 //! readings ─ build, parse ─▶ analyses ─ notation, words ─▶ writing
 //! ```
+//!
+//! Examples of this crate measure it: `parse --score FILE` (sentences read exactly), `clauses FILE`
+//! (spatial clauses of route texts, [`clauses`]), `vocabulary FILE` (place words that the lexicon covers).
 
 pub mod act;
 mod aside;

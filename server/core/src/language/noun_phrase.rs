@@ -174,7 +174,11 @@ impl Cursor<'_> {
             let more = !next.is_empty() && next != COMMA;
             if self.eat_any("nearest|closest").is_some() {
                 features.nearest = true;
-            } else if let Some(n) = self.ordinal().filter(|_| more && self.peek(2) != "floor") {
+            } else if let Some(n) = self.ordinal().filter(|_| {
+                more && !(next == "floor"
+                    && !is_function_word(self.peek(2))
+                    && !matches!(self.peek(2), "" | COMMA))
+            }) {
                 self.step();
                 features.ordinal = Some(n);
             } else if let Some(n) = counted(self.peek(0))

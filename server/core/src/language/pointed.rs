@@ -43,9 +43,9 @@ fn subject(at: &mut Cursor) -> Option<Head> {
     if at.eat_any("that place|that room over there|that room|that one|that over there").is_some() {
         return Some(Head::There);
     }
-    let word = at.eat_any("this|these|here|that|it")?;
+    let word = at.eat_any("this|these|right here|here|those|that|it")?;
     Some(match word {
-        "that" => Head::There,
+        "that" | "those" => Head::There,
         "it" => Head::It,
         _ => Head::Here,
     })
@@ -143,8 +143,9 @@ pub(super) fn related_predicate(at: &mut Cursor, head: Head) -> Option<Readings>
     let chain = at.chain(false);
     let first = chain.first()?;
     let counted = first.landmarks.iter().any(|l| l.features.count.is_some());
-    let pointless =
-        matches!(first.relation, R::To | R::In | R::On | R::At | R::Contains) && !chain.sure() && !counted;
+    let onward = matches!(first.relation, R::To | R::Contains);
+    let pointless = onward
+        || matches!(first.relation, R::To | R::In | R::On | R::At | R::Contains) && !chain.sure() && !counted;
     // "It is by the door" tells where some thing is.
     let vague = !counted && first.landmarks.iter().any(|l| l.label().is_some()) && !chain.sure();
     let door = first.landmarks.iter().all(|l| l.label().is_some_and(|n| n.as_str().ends_with("door")))

@@ -97,7 +97,7 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ("right of", R::RightOf),
 ];
 /// Says nothing that we use.
-const ADVERBS: &str = "located|situated|found|placed|all the way|way|back|out|over|up|further|farther|a bit|a little|\
+const ADVERBS: &str = "located|situated|found|placed|halfway|partway|midway|all the way|way|back|out|over|up|further|farther|a bit|a little|\
     somewhere|still|also|both|all|tucked away|somewhere over|hidden|immediately adjacent|very|really|pretty|quite|\
     straight|not far|standing";
 
@@ -191,6 +191,8 @@ impl Cursor<'_> {
                     | R::Past
                     | R::Across
                     | R::At
+                    | R::Above
+                    | R::Below
                     | R::NorthOf
                     | R::SouthOf
                     | R::EastOf
@@ -204,6 +206,11 @@ impl Cursor<'_> {
         if pointless || upward {
             return None;
         }
+        // "The lounge is below us" is below here.
+        let first = match (relation, &first.head) {
+            (R::Above | R::Below, Head::Agent | Head::Speaker) => Phrase::new(Head::Here),
+            _ => first,
+        };
         let mut landmarks = vec![first];
         if relation == R::Between {
             if self.eat("and") {

@@ -24,6 +24,10 @@ const WHEN: &str = "when you reach|when you get to|when you come to|when you see
 /// Reads directions, and what is at their end.
 pub(super) fn route_clause(at: &mut Cursor) -> Option<Readings> {
     let mut steps = Vec::new();
+    if at.eat_any("to get to|in order to get to|to go to|to reach|to find").is_some() {
+        at.landmark()?;
+        at.eat(",");
+    }
     loop {
         let start = *at;
         if !steps.is_empty()

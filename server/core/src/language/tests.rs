@@ -25,7 +25,7 @@ fn the_golden_sentences_are_read_exactly() {
 #[test]
 fn what_is_plain_gives_the_label_that_a_map_uses() {
     for (text, label) in [
-        ("They call this place the Stata cafeteria.", "stata cafeteria"),
+        ("They call this place the Gates cafeteria.", "gates cafeteria"),
         ("This is lecture hall 123", "lecture hall one twenty three"),
         ("this is Nick's office", "nick's office"),
         ("this is the men’s bathroom", "men's bathroom"),
@@ -41,7 +41,7 @@ fn what_is_plain_gives_the_label_that_a_map_uses() {
         assert_eq!((at.head.clone(), what.label()), (Head::Here, Name::new(label)), "{text}");
         assert!(*certainty >= 1.0);
     }
-    for text in ["This is where we keep the printers.", "This is the room with the printers."] {
+    for text in ["This is where they keep the copiers.", "This is the room with the printers."] {
         let parse = parse(text);
         let Some(Content::Label { what, .. }) = parse.acts().first().map(|a| &a.content) else {
             panic!("{text}: {}", parse.notation())
@@ -110,12 +110,14 @@ fn what_lies_nowhere_on_a_map_asserts_nothing() {
         "sales are through the roof",
         "the truth is far from here",
         "the party is next door",
+        "the sandwich is cold",
+        "the zorb is my favourite",
         "the gym is down here",
         "the gym is near the gym",
         "there is a lamp on the desk",
         "when you are in the gym turn left",
         "This is the kitchen and it smells",
-        "Turn the lights off in the lab.",
+        "Switch the lights off in the gym.",
     ] {
         assert_eq!(asserted(text), vec![], "{text}");
     }
@@ -174,10 +176,10 @@ fn sentences_of_one_text_belong_together() {
 
 #[test]
 fn attachments_stay_open() {
-    let parse = parse("The office near the lounge by the stairs is empty.");
+    let parse = parse("The lab near the kitchen by the lobby is locked.");
     let read: Vec<&str> = parse.analyses.iter().map(|a| a.notation.as_str()).collect();
-    let low = "attr(office[near lounge[near stairs]],empty)";
-    assert_eq!(read, [low, "attr(office[near lounge][near stairs],empty)"]);
+    let low = "attr(lab[near kitchen[near lobby]],locked)";
+    assert_eq!(read, [low, "attr(lab[near kitchen][near lobby],locked)"]);
     let sum: f64 = parse.analyses.iter().map(|a| a.weight).sum();
     assert!(parse.analyses[0].weight > parse.analyses[1].weight && sum < 1.0);
 }
@@ -226,7 +228,7 @@ fn hearings_are_weighed() {
 
 #[test]
 fn a_guess_at_a_misheard_name_is_marked() {
-    let guess = parse("the kitten is down the hall");
+    let guess = parse("the kitten is past the stairs");
     let [Act { content: Content::Locate(Locate { repaired: true, .. }), .. }] = guess.acts() else {
         panic!("{}", guess.notation())
     };
