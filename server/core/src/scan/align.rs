@@ -9,10 +9,11 @@
 //! least, a normal's component is shrunk by what noise may have made it (Breiman's non-negative
 //! garrote): `n·u ← n·u (1 − τ²/(n·u)²)₊`. What faces along the corridor, a door's jamb or the end wall,
 //! still counts; the rest leaves the direction to the prior, as solution remapping does (Zhang, Kaess
-//! and Singh 2016), and the information shows it. What is left may be no part of the building: there
-//! a prior may be given more weight than elsewhere.
+//! and Singh 2016), and the information shows it. What is left may be no part of the building, but the
+//! legs of a guide who walks ahead: along u what was not seen to stand says as good as nothing, and a
+//! prior may be given more weight than elsewhere.
 
-use super::cloud::{Point, Surfaces};
+use super::cloud::{Nearest, Point, Surfaces};
 use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
 
@@ -155,6 +156,12 @@ impl Weak {
         let rest = (1.0 - kept * kept).max(0.0).sqrt().copysign(across);
         (kept * self.x - rest * self.y, kept * self.y + rest * self.x)
     }
+
+    /// A normal less its component along the direction, the more the weaker that is.
+    fn damped(&self, (a, b): (f64, f64)) -> (f64, f64) {
+        let off = (a * self.x + b * self.y) * self.share;
+        (a - off * self.x, b - off * self.y)
+    }
 }
 
 struct Fit {
@@ -180,12 +187,12 @@ fn linearise(
     let (mut pairs, mut inliers, mut squares) = (0, 0, 0.0);
     for p in source.iter().step_by(stride) {
         let moved = p.turned(x, s, c);
-        let Some(q) = target.nearest(&moved, gate_m) else { continue };
+        let Some(Nearest { point: q, stands }) = target.nearest(&moved, gate_m) else { continue };
         let (nx, ny) = (f64::from(q.nx), f64::from(q.ny));
         let (dx, dy) = (f64::from(moved.x - q.x), f64::from(moved.y - q.y));
         // In the source's frame.
         let seen = (c * nx + s * ny, -s * nx + c * ny);
-        let (a, b) = weak.map_or(seen, |w| w.denoised(seen));
+        let (a, b) = weak.map_or(seen, |w| if stands { w.denoised(seen) } else { w.damped(seen) });
         let r = a * (c * dx + s * dy) + b * (c * dy - s * dx);
         pairs += 1;
         if r.abs() < INLIER_M {
@@ -300,6 +307,39 @@ mod tests {
         let firm = Prior { where_weak: 1e6, ..prior };
         let found = align(&near(&corridor), &Index::new(&corridor, 0.6), &guess, Some(&firm), 0.6).unwrap();
         assert!((found.target_from_source.x_m - 0.4).abs() < 0.02, "{found:?}");
+    }
+
+    /// Surfaces of which none was seen for long.
+    struct Fresh(Index);
+
+    impl Surfaces for Fresh {
+        fn nearest(&self, p: &Point, gate_m: f32) -> Option<Nearest<'_>> {
+            self.0.nearest(p, gate_m).map(|q| Nearest { stands: false, ..q })
+        }
+    }
+
+    #[test]
+    fn what_was_not_seen_to_stand_says_nothing_along_a_corridor() {
+        let (mut corridor, prior) = rough_corridor();
+        // Legs, perhaps.
+        corridor.extend(wall(3.0, 0.0, 3.0, 0.4));
+        let guess = prior.target_from_source;
+        let fresh = Fresh(Index::new(&corridor, 0.6));
+        let found = align(&near(&corridor), &fresh, &guess, Some(&prior), 0.6).unwrap();
+        assert!((found.target_from_source.x_m - 0.4).abs() < 0.02, "{found:?}");
+        assert!(found.target_from_source.y_m.abs() < 0.01, "{found:?}");
+        let stands = align(&near(&corridor), &fresh.0, &guess, Some(&prior), 0.6).unwrap();
+        assert!(stands.target_from_source.x_m.abs() < 0.02, "{stands:?}");
+    }
+
+    #[test]
+    fn a_room_seen_for_the_first_time_counts_in_full() {
+        let truth = Pose2::new(0.2, -0.15, 0.1);
+        let source: Vec<Point> = room().iter().map(|p| p.moved(&truth.inverse())).collect();
+        let fresh = Fresh(Index::new(&room(), 0.6));
+        let found = align(&source, &fresh, &Pose2::default(), None, 0.6).unwrap();
+        let off = truth.between(&found.target_from_source);
+        assert!(off.x_m.hypot(off.y_m) < 1e-3 && off.yaw_rad.abs() < 1e-3, "{off:?}");
     }
 
     #[test]

@@ -49,10 +49,19 @@ pub fn moved<'a>(points: &'a [Point], outer_from_inner: &'a Pose2) -> impl Itera
     points.iter().map(move |p| p.turned(outer_from_inner, s, c))
 }
 
+/// A surface point that another is laid on.
+#[derive(Clone, Copy, Debug)]
+pub struct Nearest<'a> {
+    /// The point.
+    pub point: &'a Point,
+    /// Whether it was seen there for long enough to be no passer-by.
+    pub stands: bool,
+}
+
 /// Surfaces that points can be laid on.
 pub trait Surfaces {
     /// The nearest surface point within `gate_m` whose normal agrees with `p`'s to 45°.
-    fn nearest(&self, p: &Point, gate_m: f32) -> Option<&Point>;
+    fn nearest(&self, p: &Point, gate_m: f32) -> Option<Nearest<'_>>;
 }
 
 /// Largest whole number not above: `f32::floor` is a library call on the oldest CPUs that we run on.
@@ -163,8 +172,8 @@ impl Index {
 }
 
 impl Surfaces for Index {
-    /// The gate is the cell at most.
-    fn nearest(&self, p: &Point, gate_m: f32) -> Option<&Point> {
+    /// The gate is the cell at most. All that was indexed stands.
+    fn nearest(&self, p: &Point, gate_m: f32) -> Option<Nearest<'_>> {
         let (cx, cy) = ((p.x - self.x0) * self.inv_cell, (p.y - self.y0) * self.inv_cell);
         if !(cx > -2.0 && cy > -2.0 && cx < 1e6 && cy < 1e6) {
             return None;
@@ -186,7 +195,7 @@ impl Surfaces for Index {
             }
             row += 1;
         }
-        best
+        best.map(|point| Nearest { point, stands: true })
     }
 }
 
@@ -214,7 +223,7 @@ mod tests {
                 .filter(|q| d2(q) < gate * gate && q.nx * p.nx + q.ny * p.ny > 0.7)
                 .map(d2)
                 .fold(f32::INFINITY, f32::min);
-            let found = index.nearest(&p, gate).map_or(f32::INFINITY, d2);
+            let found = index.nearest(&p, gate).map_or(f32::INFINITY, |q| d2(q.point));
             prop_assert_eq!(found.to_bits(), brute.to_bits());
         }
 

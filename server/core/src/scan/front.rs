@@ -321,9 +321,9 @@ impl FrontEnd {
             left.extend(self.keys.pop_front());
         }
         if let (Some(local), Some(new)) = (&mut self.local, self.keys.back()) {
-            local.add(&new.sweep.points, &new.front_from_body);
+            local.add(&new.sweep.points, &new.front_from_body, new.path_m);
             for key in left {
-                local.take_away(&key.sweep.points, &key.front_from_body);
+                local.take_away(&key.sweep.points, &key.front_from_body, key.path_m);
             }
         }
     }
@@ -333,7 +333,7 @@ impl FrontEnd {
         self.local.get_or_insert_with(|| {
             let mut local = LocalMap::default();
             for key in keys {
-                local.add(&key.sweep.points, &key.front_from_body);
+                local.add(&key.sweep.points, &key.front_from_body, key.path_m);
             }
             local
         })

@@ -173,9 +173,15 @@ fn spread(k: usize) -> f64 {
         - 0.5
 }
 
+/// Middles of the legs, 14 cm thick, of a guide who keeps 1.5 m ahead in strides of 1.4 m.
+fn legs(walked_m: f64) -> Vec<(f64, f64)> {
+    let swing_m = 0.22 * (std::f64::consts::TAU * walked_m / 1.4).sin();
+    vec![(1.5 + swing_m, 0.1), (1.5 - swing_m, -0.1)]
+}
+
 /// What a full circle of 12 m sees between two bare walls, ±1.2 m, that end nowhere: 720 rays with
-/// noise, all at once or one after the other while the robot drives on.
-fn between_walls(k: usize, step_m: f64, swept: bool) -> Sweep {
+/// noise, all at once or one after the other while the robot drives on. A guide may walk ahead.
+fn between_walls(k: usize, step_m: f64, swept: bool, guided: bool) -> Sweep {
     let laser = Laser {
         id: "round".into(),
         body_from_laser: Pose2::default(),
@@ -184,9 +190,15 @@ fn between_walls(k: usize, step_m: f64, swept: bool) -> Sweep {
         range_max_m: 12.0,
         ignored_rad: vec![],
     };
+    let legs = if guided { legs(k as f64 * step_m) } else { vec![] };
     let range = |ray: usize| {
-        let s = (ray as f64 * 0.5).to_radians().sin();
-        (1.2 / s.abs() + 0.05 * spread(720 * k + ray)) as f32
+        let (s, c) = (ray as f64 * 0.5).to_radians().sin_cos();
+        let leg = |&(x, y): &(f64, f64)| {
+            let (ahead, off) = (x * c + y * s, x * s - y * c);
+            (ahead > 0.0 && off.abs() < 0.07).then(|| ahead - (0.0049 - off * off).sqrt())
+        };
+        let nearest = legs.iter().filter_map(leg).fold(1.2 / s.abs(), f64::min);
+        (nearest + 0.05 * spread(720 * k + ray)) as f32
     };
     let scan = Scan {
         robot: "r".into(),
@@ -208,7 +220,7 @@ fn along_a_bare_corridor_odometry_decides_and_the_covariance_shows_it() {
         let mut frozen = Vec::new();
         let mut odom_m = 0.0;
         for k in 0..n {
-            let seen = between_walls(k, step_m, swept);
+            let seen = between_walls(k, step_m, swept, false);
             frozen.extend(front.scan(k as i64 * 100_000_000, Pose2::new(odom_m, 0.0, 0.0), seen).frozen);
             odom_m += step_m * (wheels + 0.1 * spread(k));
         }
@@ -223,4 +235,16 @@ fn along_a_bare_corridor_odometry_decides_and_the_covariance_shows_it() {
             assert!(p[(0, 0)].sqrt() > 0.035 && p[(1, 1)].sqrt() < 0.02, "{p}");
         }
     }
+}
+
+#[test]
+fn a_guide_ahead_in_a_bare_corridor_does_not_hold_the_robot_back() {
+    let (step_m, n) = (0.067, 240);
+    let mut front = FrontEnd::new(1.0);
+    for k in 0..n {
+        let odom = Pose2::new(k as f64 * step_m, 0.0, 0.0);
+        front.scan(k as i64 * 100_000_000, odom, between_walls(k, step_m, false, true));
+    }
+    let (here, path_m) = (front.front_from_body(), (n - 1) as f64 * step_m);
+    assert!((here.x_m - path_m).abs() < 0.01 * path_m, "{path_m}, made {here:?}");
 }
