@@ -2,6 +2,18 @@
 
 use serde::{Deserialize, Serialize};
 
+/// Rules by which sentences are taken in.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Rules {
+    /// All that is understood, weighing particles, grounded again as the map grows.
+    #[default]
+    Toponym,
+    /// The paper's own, for comparison: names and plain relations, grounded once by σ(−d / 30 m); no
+    /// weights, no second thoughts.
+    Paper,
+}
+
 /// Settings of a [`crate::Mapper`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -12,9 +24,8 @@ pub struct Config {
     pub seed: u64,
     /// Whether sentences are listened to at all.
     pub language: bool,
-    /// Whether sentences are taken in by the paper's own rules: names and plain relations, grounded once by
-    /// σ(−d / 30 m); no weights, no second thoughts. For comparison.
-    pub paper_language: bool,
+    /// By whose rules sentences are taken in.
+    pub rules: Rules,
     /// Whether names propose edges, eqs. (8–9).
     pub semantic_edges: bool,
     /// Whether older places are looked at at all: without, the map is the front end's.
@@ -35,7 +46,7 @@ impl Default for Config {
             particles: 30,
             seed: 1,
             language: true,
-            paper_language: false,
+            rules: Rules::Toponym,
             semantic_edges: true,
             loops: true,
             inject_loops: 0.0,

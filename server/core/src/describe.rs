@@ -1,6 +1,7 @@
 //! Step 3 of Algorithm 1, descriptions: where each particle puts what a sentence locates, eqs.
 //! (13–16), when it is said and again as the map grows: what was not there yet may be by now.
 
+use crate::config::Rules;
 use crate::filter::Filter;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
@@ -40,7 +41,7 @@ impl Filter {
         for name in &figures {
             ledger.enter_name(name);
         }
-        let (ledger, by_paper) = (&self.ledger, self.config.paper_language);
+        let (ledger, by_paper) = (&self.ledger, self.config.rules == Rules::Paper);
         self.particles.par_iter_mut().for_each(|p| {
             let scene = Scene {
                 places: places(&poses(p), path_m),
@@ -70,7 +71,7 @@ impl Filter {
     }
 
     fn reground_some(&mut self, utterances: &[u32]) {
-        if self.config.paper_language {
+        if self.config.rules == Rules::Paper {
             return;
         }
         let path_m: Vec<f64> = self.graph.places().iter().map(|p| p.path_m).collect();
@@ -91,7 +92,7 @@ impl Filter {
         poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
         path_m: &[f64],
     ) {
-        if self.config.paper_language {
+        if self.config.rules == Rules::Paper {
             return;
         }
         let speaks =

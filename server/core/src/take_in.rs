@@ -1,6 +1,7 @@
 //! What the acts of a sentence do to every particle: its weight, by what was said before (4), and its
 //! labels, eq. (12).
 
+use crate::config::Rules;
 use crate::filter::Filter;
 use crate::graph::Vertex;
 use crate::labels::{DIRECT, Evidence, LabelId, Labels, Source, tie};
@@ -39,7 +40,7 @@ impl Filter {
     }
 
     fn take(&mut self, saying: &Saying, content: &Content, certainty: f64, likeliest: bool) {
-        if self.config.paper_language && !matches!(content, Content::Label { .. }) {
+        if self.config.rules == Rules::Paper && !matches!(content, Content::Label { .. }) {
             return;
         }
         match content {
@@ -65,7 +66,7 @@ impl Filter {
         let evidence = Evidence { utterance, said, label, place, weight: DIRECT * certainty, source };
         for p in &mut self.particles {
             let log = log_label(&p.labels, &(here.poses)(p), (place, label), sameness, p0);
-            if !self.config.paper_language {
+            if self.config.rules == Rules::Toponym {
                 p.weigh_by_words(utterance, certainty * log);
             }
             p.labels.add(evidence);

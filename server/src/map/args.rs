@@ -4,6 +4,7 @@ use super::trajectory::Format;
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
 use toponym_core::Config;
+use toponym_core::config::Rules;
 
 /// Rules by which sentences are taken in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -94,7 +95,10 @@ impl MapArgs {
             particles: self.particles.unwrap_or(defaults.particles),
             seed: self.seed.unwrap_or(defaults.seed),
             language: !self.no_language,
-            paper_language: self.preset == Preset::Paper,
+            rules: match self.preset {
+                Preset::Toponym => Rules::Toponym,
+                Preset::Paper => Rules::Paper,
+            },
             semantic_edges: !self.no_semantic_edges,
             loops: !self.no_loops,
             inject_loops: self.inject_loops.unwrap_or(defaults.inject_loops),

@@ -5,11 +5,11 @@
 use super::footprint::Footprint;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// Gaps sampled, in scales: middles of equal quarters of exp(−gap/scale), the last one's mean.
-const GAPS: [f64; 4] = [0.13, 0.47, 0.98, 2.39];
+/// Gaps sampled, in scales: middles of equal quarters of exp(−gap/scale) up to the end, the last one's mean.
+const GAPS: [f64; 4] = [0.13, 0.46, 0.95, 2.1];
 /// Samples round the footprint, for each gap, and in it, along and across.
-const ROUND: usize = 10;
-const INSIDE: (usize, usize) = (5, 1);
+const ROUND: usize = 12;
+const INSIDE: (usize, usize) = (12, 1);
 /// Beyond so many scales there is nothing: 2 % of what is at the edge.
 const END: f64 = 3.9;
 
@@ -33,7 +33,9 @@ impl Envelope {
 
     /// Integral over the floor: the footprint, four sides, four corners.
     pub fn area_m2(&self) -> f64 {
-        self.footprint.area_m2() + self.sides_m() * self.scale_m + TAU * self.scale_m * self.scale_m
+        let (side, corner) = (1.0 - (-END).exp(), 1.0 - (1.0 + END) * (-END).exp());
+        let scale_m = self.scale_m;
+        self.footprint.area_m2() + self.sides_m() * scale_m * side + TAU * scale_m * scale_m * corner
     }
 
     fn sides_m(&self) -> f64 {

@@ -19,8 +19,7 @@ pub fn ground_by_paper(relation: Relation, places: &[GroundPlace], landmark: Opt
         .collect();
     p[landmark] = 0.0;
     let z = p.iter().sum::<f64>().max(f64::MIN_POSITIVE);
-    p.iter_mut().for_each(|p| *p /= z);
-    p
+    p.into_iter().map(|p| p / z).collect()
 }
 
 #[cfg(test)]

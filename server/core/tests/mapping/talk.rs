@@ -2,6 +2,7 @@
 
 use crate::world::{drive, events, laser, say};
 use crate::{run, where_is};
+use toponym_core::config::Rules;
 use toponym_core::effects::{Effect, HeardStatus};
 use toponym_core::event::{Command, Event};
 use toponym_core::{Config, Mapper};
@@ -110,7 +111,7 @@ fn a_correction_takes_back_exactly_what_it_corrects() {
     assert!(where_is(&corrected, "kitchen").candidates.is_empty());
     assert!(p_is(&corrected, "gym") > 0.7);
     // By the paper's rules nothing is taken back.
-    let paper = Config { paper_language: true, ..Config::default() };
+    let paper = Config { rules: Rules::Paper, ..Config::default() };
     let mapper = told_by(paper, &[KITCHEN, (33, "no, this is the gym, not the kitchen", None)]);
     assert!(p_is(&mapper, "kitchen") > 0.7);
 }
@@ -137,6 +138,6 @@ fn another_name_of_a_place_is_understood() {
 #[test]
 fn the_papers_rules_ground_once() {
     let said = [(20, "the lounge is near the gym", None), (60, "this is the gym", None)];
-    let paper = Config { paper_language: true, ..Config::default() };
+    let paper = Config { rules: Rules::Paper, ..Config::default() };
     assert!(where_is(&told_by(paper, &said), "lounge").candidates.is_empty());
 }

@@ -156,7 +156,7 @@ fn near_keeps_to_the_neighbourhood() {
 fn away_from_grows_with_distance_at_first() {
     let g = ground(Relation::AwayFrom, &corridor(), 0, &[(0, 1.0)], &[]);
     assert!(g.p[2] < g.p[6]);
-    assert!(g.p[15] < 30.0 * g.p[40], "bounded");
+    assert!(g.p[15] > g.p[40], "nobody means the far end of the building");
 }
 
 #[test]
