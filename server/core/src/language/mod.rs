@@ -1,12 +1,21 @@
 //! Language, first cut: what a guide's sentence says, and where it puts it (paper III-E).
 //!
 //! [`parse`] turns a text into acts: names given to the place held, one of the four relations
-//! between a figure and a landmark, questions. [`ground`] turns a relation into a probability for
-//! every place, eqs. (14–16). What is not understood yields no act, and [`words`] says so.
+//! between a figure and a landmark, questions. What is not understood yields no act, and [`words`]
+//! says so.
+//!
+//! [`ground_clause`] turns the readings of a clause into a probability for every place, eqs. (14–16):
+//! `clause` is what it is asked, `scene` and `ways` what the speaker sees and walks, `factor` the
+//! density of a figure (an `envelope` round a `footprint`, times a template or a learned factor:
+//! `path_features`, `path_factors`, `path_weights`), `ground` the sums.
 //!
 //! Deliberately absent here: negation, correction, hedges, routes, generic statements, other
 //! relations. A sentence that holds any of them is not understood rather than half understood.
 
+mod clause;
+mod envelope;
+mod factor;
+mod footprint;
 mod ground;
 mod label;
 mod lexicon;
@@ -16,14 +25,22 @@ mod normalise;
 mod noun_phrase;
 mod numbers;
 mod parse;
+mod path_factors;
+mod path_features;
+mod path_weights;
 mod relation;
+mod scene;
+mod ways;
 mod word_lists;
 mod words;
 
-pub use ground::{GroundPlace, Grounding, ground};
+pub use clause::{Frame, LandmarkBelief, Narrowing, Reading};
+pub use footprint::Footprint;
+pub use ground::{GroundPlace, Grounding, ground, ground_clause};
 pub use names::Name;
 pub use normalise::MAX_TEXT_BYTES;
 pub use parse::{parse, parse_query};
+pub use path_features::{FEATURES, path_features};
 pub use relation::Relation;
 pub use words::{NOT_UNDERSTOOD, words};
 
