@@ -50,8 +50,8 @@ const RATIO: (f64, f64) = (0.05, 20.0);
 const NOT_YET: f64 = 0.5;
 /// No name is so well known that it can't also apply to a place not yet seen.
 const KNOWN_MAX: f64 = 0.95;
-/// Whose left "left of the kitchen" is, where the words don't say: people mostly speak as who looks at
-/// the landmark sees it (Levelt 1996 finds some two thirds for this "deictic" use).
+/// Whose left "left of the kitchen" is, where the words don't say: set by reasoning, mostly as who looks
+/// at the landmark sees it.
 const FRAMES: [(Frame, f64); 3] = [(Frame::Hearer, 0.7), (Frame::Intrinsic, 0.2), (Frame::Path, 0.1)];
 
 /// Which place is the figure of a clause with one reading, eqs. (14–16): see [`ground_clause`].
