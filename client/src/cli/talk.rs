@@ -52,16 +52,19 @@ pub async fn say(endpoint: &str, site: &str, args: &SayArgs) -> Result<u8, Failu
     })
 }
 
+/// Less is not shown.
+const SHOWN_MIN: f64 = 0.005;
+
 /// How a sentence was read and where it was put, with its id to take it back by.
 fn explained(heard: &Heard, graph: &GraphReply) -> String {
     let mut text = format!("sentence  {}\nread as   {}\n", heard.id, heard.parse);
-    for grounded in &heard.grounded {
+    for grounded in heard.grounded.iter().filter(|g| g.p >= SHOWN_MIN) {
         let place = graph.places.iter().find(|p| p.id == grounded.place);
         let at = place.map_or(String::new(), |p| format!(" (x {:.2} m, y {:.2} m)", p.x_m, p.y_m));
         let _ = writeln!(text, "put at    place {}{at}: {:.2}", grounded.place, grounded.p);
     }
     let elsewhere = 1.0 - heard.grounded.iter().map(|g| g.p).sum::<f64>();
-    if heard.status == HeardStatus::Understood && elsewhere > 0.005 {
+    if !heard.grounded.is_empty() && elsewhere >= SHOWN_MIN {
         let _ = writeln!(text, "          elsewhere or not seen yet: {elsewhere:.2}");
     }
     text

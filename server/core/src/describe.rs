@@ -6,10 +6,11 @@ use crate::filter::Filter;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::{Evidence, LabelId, Labels, Source};
-use crate::language::act::{Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
-use crate::language::{GroundPlace, LandmarkBelief, Narrowing, Reading, ground_by_paper, ground_clause};
+use crate::language::act::{Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
+use crate::language::{
+    GroundPlace, LandmarkBelief, Narrowing, Reading, Relation, ground_by_paper, ground_clause,
+};
 use crate::ledger::Ledger;
-use crate::listen::locates;
 use crate::particle::Particle;
 use rayon::prelude::*;
 use std::collections::BTreeMap;
@@ -33,7 +34,7 @@ impl Filter {
         poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
         path_m: &[f64],
     ) {
-        let figures: Vec<_> = locates(parse).filter_map(|(_, l)| l.figure.label()).collect();
+        let figures: Vec<_> = located(parse).iter().filter_map(|(_, l)| l.figure.label()).collect();
         if figures.is_empty() {
             return;
         }
@@ -99,7 +100,7 @@ impl Filter {
             |p: &Phrase| p.label().is_some_and(|name| self.ledger.label(name.as_str()) == Some(label));
         let about = |l: &Locate| speaks(&l.figure) || l.landmarks.iter().any(speaks);
         let of = |u: &u32| &self.ledger.entries()[*u as usize];
-        let due = self.ledger.descriptions().filter(|u| locates(&of(u).parse).any(|(_, l)| about(l)));
+        let due = self.ledger.descriptions().filter(|u| located(&of(u).parse).iter().any(|(_, l)| about(l)));
         let due: Vec<(u32, Parse, Vertex)> = due.map(|u| (u, of(&u).parse.clone(), of(&u).held)).collect();
         for (utterance, parse, held) in due {
             self.ground(utterance, &parse, held, poses, path_m);
@@ -126,8 +127,8 @@ struct Scene<'a> {
 impl Scene<'_> {
     /// Δα of all that a sentence locates: for each figure a clause, summed over its readings.
     fn grounded(&self, parse: &Parse) -> Vec<Evidence> {
-        let mut clauses: BTreeMap<LabelId, Vec<(f64, &Locate)>> = BTreeMap::new();
-        for (certainty, l) in locates(parse) {
+        let mut clauses: BTreeMap<LabelId, Vec<(f64, Locate)>> = BTreeMap::new();
+        for (certainty, l) in located(parse) {
             let said = l.figure.label().and_then(|name| self.ledger.said(name.as_str()));
             if let Some(said) = said.filter(|&s| self.ledger.speaks_of(self.utterance, self.ledger.meant(s)))
             {
@@ -150,7 +151,7 @@ impl Scene<'_> {
     }
 
     /// p(figure is place i | λ), eq. (14), given what is located as its readings say.
-    fn place_of(&self, clause: &[(f64, &Locate)], figure: LabelId) -> Vec<f64> {
+    fn place_of(&self, clause: &[(f64, Locate)], figure: LabelId) -> Vec<f64> {
         let landmarks: Vec<Vec<Vec<(usize, f64)>>> = clause
             .iter()
             .map(|(_, l)| l.landmarks.iter().map(|phrase| self.landmark(phrase)).collect())
@@ -229,6 +230,44 @@ impl Scene<'_> {
     }
 }
 
+/// What the readings of a text locate, each with the probability that it is said and meant.
+pub(crate) fn located(parse: &Parse) -> Vec<(f64, Locate)> {
+    let of = |content: &Content| match content {
+        Content::Locate(l) => Some(by_doors(l)),
+        // "The last office on the left is Nick's".
+        Content::Alias { what, also } => described(also, what),
+        Content::Correct { is, .. } => match &**is {
+            Content::Locate(l) => Some(by_doors(l)),
+            _ => None,
+        },
+        _ => None,
+    };
+    let acts = parse.analyses.iter().flat_map(|a| a.acts.iter().map(|act| (a.weight * act.certainty, act)));
+    acts.filter_map(|(p, act)| Some((p, of(&act.content)?))).collect()
+}
+
+/// "It is the second door on the left": what is at a described spot lies as that is described.
+fn by_doors(l: &Locate) -> Locate {
+    let is_counted = |p: &&Phrase| p.features.ordinal.is_some() || p.features.count.is_some();
+    let spot = l.landmarks.first().filter(is_counted).filter(|_| l.relation == Relation::At);
+    spot.and_then(|spot| described(&l.figure, spot)).unwrap_or_else(|| l.clone())
+}
+
+/// A figure that lies as a phrase says: "the second door *on the left*".
+fn described(figure: &Phrase, as_said: &Phrase) -> Option<Locate> {
+    let Restriction { relation, modifiers, landmarks } = as_said.within.first()?.clone();
+    let modifiers = Modifiers { count: counted(as_said).or(modifiers.count), ..modifiers };
+    Some(Locate { figure: figure.clone(), relation, modifiers, landmarks, frame: None, repaired: false })
+}
+
+/// "The second door", "two doors".
+fn counted(phrase: &Phrase) -> Option<u32> {
+    match phrase.features.ordinal {
+        Some(Ordinal::Nth(n)) => Some(n),
+        _ => phrase.features.count,
+    }
+}
+
 /// A landmark's places, and whether it is one that one goes along.
 fn belief<'a>(phrase: &Phrase, places: &'a [(usize, f64)]) -> LandmarkBelief<'a> {
     let way = phrase.head == Head::Path || phrase.label().is_some_and(|name| name.is_way());
@@ -237,11 +276,29 @@ fn belief<'a>(phrase: &Phrase, places: &'a [(usize, f64)]) -> LandmarkBelief<'a>
 
 /// "Just", "twenty meters", "the second door".
 fn narrowing(modifiers: &Modifiers, landmark: Option<&Phrase>) -> Narrowing {
-    let features = landmark.map(|p| &p.features);
-    let nth = features.and_then(|f| match f.ordinal {
-        Some(Ordinal::Nth(n)) => Some(n),
-        _ => f.count,
-    });
+    let nth = landmark.and_then(counted);
     let distance_m = modifiers.distance.map(Distance::metres);
     Narrowing { just: modifiers.just, distance_m, doors: nth.or(modifiers.count) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::parse;
+
+    #[test]
+    fn a_door_counted_along_the_way_is_located_and_may_be_whose() {
+        for (text, relation, count) in [
+            ("the kitchen is the second door on the left", Relation::LeftSide, Some(2)),
+            ("the second office on the left is Nick's", Relation::LeftSide, Some(2)),
+            ("two doors down from here is the server room", Relation::Down, Some(2)),
+            ("the last office on the right is Nick's", Relation::RightSide, None),
+        ] {
+            let parse = parse(text);
+            let all = located(&parse);
+            let (_, l) = all.first().unwrap_or_else(|| panic!("{text} {}", parse.notation()));
+            assert_eq!((l.relation, l.modifiers.count), (relation, count), "{text}");
+            assert!(l.figure.label().is_some(), "{text}");
+        }
+    }
 }

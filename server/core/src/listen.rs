@@ -1,5 +1,6 @@
 //! Step 3 of Algorithm 1, the sentences: what each says and what becomes of it.
 
+use crate::describe::located;
 use crate::effects::{Heard, HeardStatus, PlaceId};
 use crate::event::Utterance;
 use crate::filter::Filter;
@@ -7,7 +8,7 @@ use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::Source;
 use crate::language;
-use crate::language::act::{Content, Locate, Parse};
+use crate::language::act::{Content, Parse};
 use crate::ledger::{Entry, UTTERANCES_MAX};
 use crate::particle::Particle;
 use std::collections::BTreeMap;
@@ -89,31 +90,36 @@ impl Filter {
             held,
             stands: true,
         };
-        let describes = locates(&parse).next().is_some();
+        let describes = !located(&parse).is_empty();
         let number = Arc::make_mut(&mut self.ledger).enter(entry, describes);
         self.take_in(number, &parse, held, here);
         let mut heard = heard(u, HeardStatus::Understood, &parse, words);
         heard.grounded = self.told(number);
         if describes {
-            heard.words += &self.put(&heard.grounded, held, here);
+            heard.words += &self.put(number, held, here);
         }
         heard
     }
 
     /// Where a description was put, in words.
-    fn put(&self, told: &[(PlaceId, f64)], held: Vertex, here: &Here) -> String {
-        let seen: f64 = told.iter().map(|(_, p)| p).sum();
+    fn put(&self, utterance: u32, held: Vertex, here: &Here) -> String {
         let poses = (here.poses)(self.best());
-        let Some((place, _)) = told.first().filter(|_| seen > NOT_SEEN_MAX) else {
+        let grounded = self.best().labels.evidence().iter();
+        let grounded: Vec<_> =
+            grounded.filter(|e| e.utterance == utterance && e.source == Source::Grounded).collect();
+        let seen: f64 = grounded.iter().map(|e| e.weight).sum();
+        let likeliest =
+            grounded.iter().max_by(|a, b| a.weight.total_cmp(&b.weight).then(b.place.cmp(&a.place)));
+        let Some(likeliest) = likeliest.filter(|_| seen > NOT_SEEN_MAX) else {
             return " I think I have not seen it yet.".to_owned();
         };
-        let off = poses[held as usize].between(&poses[*place as usize]);
+        let off = poses[held as usize].between(&poses[likeliest.place as usize]);
         let (distance_m, bearing_rad) = (off.x_m.hypot(off.y_m), off.y_m.atan2(off.x_m));
         if distance_m < HERE_M {
             return " I think that is here.".to_owned();
         }
         let side = SIDES[((bearing_rad / FRAC_PI_4).round() as i32).rem_euclid(8) as usize];
-        format!(" I think that is {distance_m:.0} m from here, {side}.")
+        format!(" I think that is some {distance_m:.0} m from here, {side}.")
     }
 
     fn words(&self, parse: &Parse) -> String {
@@ -134,20 +140,6 @@ impl Filter {
         told.truncate(GROUNDED_TOLD);
         told
     }
-}
-
-/// What the readings of a text locate, each with the probability that it is said and meant.
-pub(crate) fn locates(parse: &Parse) -> impl Iterator<Item = (f64, &Locate)> {
-    parse.analyses.iter().flat_map(|a| {
-        a.acts.iter().filter_map(|act| match &act.content {
-            Content::Locate(l) => Some((a.weight * act.certainty, l)),
-            Content::Correct { is, .. } => match &**is {
-                Content::Locate(l) => Some((a.weight * act.certainty, l)),
-                _ => None,
-            },
-            _ => None,
-        })
-    })
 }
 
 fn heard(u: &Utterance, status: HeardStatus, parse: &Parse, words: String) -> Heard {
