@@ -100,8 +100,7 @@ impl Mapper {
             Event::Scan(scan) => self.scan(scan, &mut effects),
             Event::Utterance(utterance) => self.hear(&utterance, &mut effects),
             Event::Command(command) => {
-                effects.push(Effect::Mended(self.filter.mend(&command)));
-                self.rev += 1;
+                self.change(&mut effects, |filter| vec![Effect::Mended(filter.mend(&command))]);
             }
             Event::Flush => self.flush(&mut effects),
         }
@@ -222,15 +221,20 @@ impl Mapper {
     /// Algorithm 1 for each place just left.
     fn grow(&mut self, frozen: Vec<FrozenPlace>, effects: &mut Effects) {
         for place in frozen {
-            let (before, edges) = (self.map_from_body(), self.filter.best().edges.clone());
-            effects.extend(self.filter.step(place));
-            self.rev += 1;
-            if !continues(&edges, &self.filter.best().edges)
-                && let (Some(old), Some(new)) = (before, self.map_from_body())
-            {
-                self.epoch += 1;
-                effects.push(Effect::Jumped { epoch: self.epoch, new_from_old: new.compose(&old.inverse()) });
-            }
+            self.change(effects, |filter| filter.step(place));
+        }
+    }
+
+    /// Changes the posterior. Where another particle is best then, the map's coordinates jump.
+    fn change(&mut self, effects: &mut Effects, change: impl FnOnce(&mut Filter) -> Effects) {
+        let (before, edges) = (self.map_from_body(), self.filter.best().edges.clone());
+        effects.extend(change(&mut self.filter));
+        self.rev += 1;
+        if !continues(&edges, &self.filter.best().edges)
+            && let (Some(old), Some(new)) = (before, self.map_from_body())
+        {
+            self.epoch += 1;
+            effects.push(Effect::Jumped { epoch: self.epoch, new_from_old: new.compose(&old.inverse()) });
         }
     }
 
@@ -248,8 +252,7 @@ impl Mapper {
             poses
         };
         let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m };
-        effects.push(Effect::Heard(self.filter.hear(u, &here)));
-        self.rev += 1;
+        self.change(effects, |filter| vec![Effect::Heard(filter.hear(u, &here))]);
     }
 
     fn flush(&mut self, effects: &mut Effects) {
@@ -339,4 +342,55 @@ fn sweep_end_ns(scan: &Scan) -> StampNs {
 /// Whether a graph is another one with edges added.
 fn continues(before: &[Edge], after: &[Edge]) -> bool {
     after.len() >= before.len() && after.iter().zip(before).all(|(a, b)| a == b)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::effects::EdgeKind;
+
+    #[test]
+    fn whatever_makes_another_particle_the_best_tells_that_coordinates_jump() {
+        let mut mapper = Mapper::new(Config::default());
+        let robot = || "r".to_owned();
+        let laser = Laser {
+            id: "l".into(),
+            body_from_laser: Pose2::default(),
+            upside_down: false,
+            range_min_m: 0.1,
+            range_max_m: 30.0,
+            ignored_rad: vec![],
+        };
+        mapper.step(Event::Setup(Setup { robot: robot(), lasers: vec![laser] }));
+        let odom_from_body = Pose2::default();
+        mapper.step(Event::Odom(Odom { robot: robot(), boot: 0, stamp_ns: 0, odom_from_body }));
+        mapper.step(Event::Scan(Scan {
+            robot: robot(),
+            laser: "l".into(),
+            stamp_ns: 0,
+            angle_min_rad: -1.5,
+            angle_increment_rad: 0.1,
+            time_increment_s: 0.0,
+            ranges_m: vec![5.0; 31],
+        }));
+        let edge = Edge {
+            i: 0,
+            j: 1,
+            kind: EdgeKind::Distance,
+            i_from_j: Pose2::default(),
+            covariance: Matrix3::identity(),
+            factor: 0,
+        };
+        let other = mapper.filter.best().clone();
+        let with_edge = Particle { edges: Arc::new(vec![edge]), ..other.clone() };
+        mapper.filter.particles = vec![with_edge, other];
+        let mut effects = Effects::new();
+        mapper.change(&mut effects, |_| Effects::new());
+        assert_eq!((effects.len(), mapper.epoch), (0, 0));
+        mapper.change(&mut effects, |filter| {
+            filter.particles.swap(0, 1);
+            Effects::new()
+        });
+        assert!(matches!(effects[..], [Effect::Jumped { epoch: 1, .. }]), "{effects:?}");
+    }
 }

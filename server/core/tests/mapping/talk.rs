@@ -29,7 +29,7 @@ fn told(said: &[(usize, &str, Option<&str>)]) -> Mapper {
 }
 
 fn mend(mapper: &mut Mapper, command: Command) -> Result<String, String> {
-    match mapper.step(Event::Command(command)).pop() {
+    match mapper.step(Event::Command(command)).into_iter().next() {
         Some(Effect::Mended(done)) => done,
         other => panic!("{other:?}"),
     }
