@@ -245,9 +245,10 @@ fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
     Some(Fit {
         i: lead.i,
         mode,
-        // Only the pair that was named is a semantic edge; what follows from it is near by now.
+        // Of a revisit that words proposed the first edge is a semantic one, at the pair that was named or
+        // where enough places agree; what follows from it is near by then.
         kind: match lead.from.origin {
-            EdgeKind::Semantic => EdgeKind::Distance,
+            EdgeKind::Semantic if lead.from.supported() => EdgeKind::Distance,
             other => other,
         },
         origin: lead.from.origin,
