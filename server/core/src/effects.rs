@@ -44,7 +44,7 @@ pub enum HeardStatus {
     Understood,
     /// Nothing changed.
     NotUnderstood,
-    /// It was understood but can't be used (no place yet, unknown landmark).
+    /// It was understood but can't be used (no place yet, a full ledger, language off).
     Refused,
 }
 

@@ -76,6 +76,15 @@ impl Fit {
         self.support >= SUPPORT_MIN && self.support_path_m >= SUPPORT_PATH_M
     }
 
+    /// Kind of the next edge of the same revisit. Of one that words proposed the first edge is a semantic
+    /// one, at the pair that was named or where enough places agree; what follows is near by then.
+    fn kind_of_next(&self) -> EdgeKind {
+        match self.origin {
+            EdgeKind::Semantic if self.supported() => EdgeKind::Distance,
+            other => other,
+        }
+    }
+
     fn quality(&self) -> f64 {
         self.mode.score * self.mode.overlap
     }
@@ -245,12 +254,7 @@ fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
     Some(Fit {
         i: lead.i,
         mode,
-        // Of a revisit that words proposed the first edge is a semantic one, at the pair that was named or
-        // where enough places agree; what follows from it is near by then.
-        kind: match lead.from.origin {
-            EdgeKind::Semantic if lead.from.supported() => EdgeKind::Distance,
-            other => other,
-        },
+        kind: lead.from.kind_of_next(),
         origin: lead.from.origin,
         support: lead.from.support + 1,
         support_path_m: lead.from.support_path_m + step_m,
@@ -321,4 +325,20 @@ fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
         }
     }
     kept.into_values().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::Matrix3;
+
+    #[test]
+    fn the_first_edge_that_counts_of_a_revisit_by_words_is_theirs() {
+        let covariance = Matrix3::identity();
+        let mode = Mode { i_from_j: Pose2::default(), covariance, score: 0.9, overlap: 0.6 };
+        let next = |kind, support| Fit::supported_by(0, mode, kind, support).kind_of_next();
+        assert_eq!(next(EdgeKind::Semantic, 1), EdgeKind::Semantic);
+        assert_eq!(next(EdgeKind::Semantic, 6), EdgeKind::Distance);
+        assert_eq!(next(EdgeKind::Relocalisation, 6), EdgeKind::Relocalisation);
+    }
 }

@@ -38,8 +38,7 @@ impl Filter {
             p.revoke(number);
         }
         self.resolve();
-        normalise(&mut self.particles);
-        self.particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+        self.rank();
     }
 
     fn rename(&mut self, from: &str, to: &str) -> Result<String, String> {
@@ -69,6 +68,12 @@ impl Filter {
             p.labels.forget(label);
         }
         Ok(format!("I know of no {name} any more."))
+    }
+
+    /// Weights that sum to one, the best particle first.
+    pub(crate) fn rank(&mut self) {
+        normalise(&mut self.particles);
+        self.particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     }
 
     /// Looks up anew what the names mean, in every particle.

@@ -117,3 +117,20 @@ impl Particle {
         Arc::ptr_eq(&self.edges, &other.edges) || self.edges == other.edges
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sentence_taken_back_takes_its_weight_along_and_no_other() {
+        let mut p = Particle::empty(1);
+        for (utterance, log_ratio) in [(0, -0.5), (1, 0.25), (0, -0.25)] {
+            p.weigh_by_words(utterance, log_ratio);
+        }
+        p.revoke(0);
+        assert!((p.log_weight - 0.25).abs() < 1e-12);
+        p.revoke(0);
+        assert!((p.log_weight - 0.25).abs() < 1e-12, "once");
+    }
+}

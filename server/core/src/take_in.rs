@@ -8,7 +8,6 @@ use crate::labels::{DIRECT, Evidence, LabelId, Labels, Source, tie};
 use crate::language::act::{Content, Head, Locate, Parse, Phrase, Sameness};
 use crate::listen::Here;
 use crate::predictive::{base_probability, log_denied, log_label};
-use crate::resample::normalise;
 use std::sync::Arc;
 
 /// What is said not to be so is not so within this distance: a room.
@@ -35,8 +34,7 @@ impl Filter {
         }
         let poses = here.poses;
         self.ground(utterance, parse, held, &|p| poses(p), &here.path_m);
-        normalise(&mut self.particles);
-        self.particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+        self.rank();
     }
 
     fn take(&mut self, saying: &Saying, content: &Content, certainty: f64, likeliest: bool) {

@@ -9,7 +9,7 @@
 
 use super::Relation;
 use super::act::Frame;
-use super::clause::{LandmarkBelief, Narrowing, Reading};
+use super::clause::{LandmarkBelief, Reading};
 use super::factor::{Factor, Target};
 use super::scene::Scene;
 
@@ -54,21 +54,6 @@ const KNOWN_MAX: f64 = 0.95;
 /// Whose left "left of the kitchen" is, where the words don't say: set by reasoning, mostly as who looks
 /// at the landmark sees it.
 const FRAMES: [(Frame, f64); 3] = [(Frame::Hearer, 0.7), (Frame::Intrinsic, 0.2), (Frame::Path, 0.1)];
-
-/// Which place is the figure of a clause with one reading, eqs. (14–16): see [`ground_clause`].
-pub fn ground(
-    relation: Relation,
-    places: &[GroundPlace],
-    speaker: usize,
-    landmark: &[(usize, f64)],
-    figure_prior: &[f64],
-) -> Grounding {
-    let landmarks =
-        [LandmarkBelief { places: landmark, way: matches!(relation, Relation::Down | Relation::Along) }];
-    let narrowing = Narrowing::default();
-    let reading = Reading { weight: 1.0, relation, frame: None, narrowing, landmarks: &landmarks };
-    ground_clause(&[reading], places, speaker, figure_prior)
-}
 
 /// Which place is the figure of a clause, eqs. (14–16), summed over its readings, frames and landmarks.
 ///

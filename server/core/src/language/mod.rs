@@ -2,7 +2,7 @@
 //!
 //! [`parse`] turns a text into weighed analyses ([`act`]): names given to places, places located, other
 //! names, denials, corrections, questions; directions and general statements are recognised and set
-//! aside. [`ground`] turns a relation into a probability for every place, eqs. (14–16). What is not
+//! aside. [`ground_clause`] turns a relation into a probability for every place, eqs. (14–16). What is not
 //! understood yields no act, and [`words`] says so.
 //!
 //! ```text
@@ -68,7 +68,7 @@ pub use act::{Act, Analysis, Content, Frame, Parse, Phrase, Sameness};
 pub use clause::{LandmarkBelief, Narrowing, Reading};
 pub use clauses::{Clause, clauses};
 pub use footprint::Footprint;
-pub use ground::{GroundPlace, Grounding, ground, ground_clause};
+pub use ground::{GroundPlace, Grounding, ground_clause};
 pub use names::Name;
 pub use normalise::MAX_TEXT_BYTES;
 pub use paper::ground_by_paper;

@@ -1,5 +1,21 @@
 use super::*;
+use crate::language::Narrowing;
 use proptest::prelude::*;
+
+/// A clause with one reading and one landmark.
+fn ground(
+    relation: Relation,
+    places: &[GroundPlace],
+    speaker: usize,
+    landmark: &[(usize, f64)],
+    figure_prior: &[f64],
+) -> Grounding {
+    let landmarks =
+        [LandmarkBelief { places: landmark, way: matches!(relation, Relation::Down | Relation::Along) }];
+    let narrowing = Narrowing::default();
+    let reading = Reading { weight: 1.0, relation, frame: None, narrowing, landmarks: &landmarks };
+    ground_clause(&[reading], places, speaker, figure_prior)
+}
 
 /// A straight corridor along x, a place per metre from 0 to 40.
 fn corridor() -> Vec<GroundPlace> {
