@@ -15,7 +15,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::hint::black_box;
 use std::iter::{once, repeat_n};
 use toponym_core::Pose2;
-use toponym_core::smoothing::{Belief, Factor, FactorId, SmoothError, Structure};
+use toponym_core::smoothing::{Belief, Factor, FactorId, JointRoom, SmoothError, Structure};
 
 /// Two sorts of town that the literature measures on, and one that is harder.
 const TOWNS: [Town; 3] = [
@@ -270,6 +270,7 @@ fn normal(rng: &mut ChaCha8Rng) -> f64 {
 fn whole(graph: &Graph) -> Result<[f64; 4], SmoothError> {
     let (mut structure, mut belief) = (Structure::new(), Belief::new());
     let (mut update_ms, mut joint_ms, mut joint_all_ms) = (Vec::new(), Vec::new(), Vec::new());
+    let mut room = JointRoom::default();
     for (k, factors) in graph.iter().enumerate() {
         grow(&mut structure, factors)?.into_iter().for_each(|id| belief.hold(id));
         let (_, ms) = timed(|| {
@@ -280,7 +281,7 @@ fn whole(graph: &Graph) -> Result<[f64; 4], SmoothError> {
         if k > 0 && k.is_multiple_of(JOINT_EVERY) {
             let older: Vec<u32> = (1..=JOINT_MANY).map(|n| n * k as u32 / (JOINT_MANY + 1)).collect();
             joint_ms.push(timed(|| black_box(belief.joint(&structure, &older)))?.1);
-            joint_all_ms.push(timed(|| black_box(belief.joint_all(&structure)))?.1);
+            joint_all_ms.push(timed(|| black_box(belief.joint_all(&structure, &mut room)).map(|_| ()))?.1);
         }
     }
     let (clones, clones_ms) = timed(|| Ok(black_box(vec![belief; CLONES])))?;

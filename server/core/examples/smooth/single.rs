@@ -14,7 +14,7 @@ use std::hint::black_box;
 use std::io::Write as _;
 use std::path::Path;
 use toponym_core::Pose2;
-use toponym_core::smoothing::{Factor, SmoothError, Smoother, Work};
+use toponym_core::smoothing::{Factor, JointRoom, SmoothError, Smoother, Work};
 
 /// Covariances with older poses are asked for after the first `JOINT_FROM` poses, every `JOINT_EVERY`,
 /// with poses at least `JOINT_AGE` older.
@@ -171,6 +171,7 @@ struct Covariances {
     pair: Vec<f64>,
     twenty: Vec<f64>,
     all: Vec<f64>,
+    room: JointRoom,
 }
 
 #[derive(Serialize)]
@@ -184,7 +185,14 @@ struct CovarianceReport {
 impl Covariances {
     fn new() -> Self {
         let rng = ChaCha8Rng::seed_from_u64(1);
-        Self { rng, current: Vec::new(), pair: Vec::new(), twenty: Vec::new(), all: Vec::new() }
+        Self {
+            rng,
+            current: Vec::new(),
+            pair: Vec::new(),
+            twenty: Vec::new(),
+            all: Vec::new(),
+            room: JointRoom::default(),
+        }
     }
 
     /// Asks what a particle filter asks once pose k is in.
@@ -201,7 +209,7 @@ impl Covariances {
             joint?;
             times.push(ms);
         }
-        let (joint, ms) = timed(|| black_box(smoother.joint_all()));
+        let (joint, ms) = timed(|| black_box(smoother.joint_all(&mut self.room)).map(|_| ()));
         joint?;
         self.all.push(ms);
         Ok(())

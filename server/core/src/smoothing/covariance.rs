@@ -22,7 +22,7 @@ use std::hint::black_box;
 use std::rc::Rc;
 
 /// Joint covariance of the newest pose with others.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Joint {
     /// Index of the newest pose t.
     pub newest: u32,
@@ -41,6 +41,14 @@ pub struct JointPart {
     pub marginal: Matrix3<f64>,
     /// Σ_tj = E[δt δjᵀ].
     pub cross: Matrix3<f64>,
+}
+
+/// Room for the answers of [`Belief::joint_all`]. Kept, it is used again: made anew for each question,
+/// its some two megabytes cost as much as the arithmetic.
+#[derive(Default)]
+pub struct JointRoom {
+    joint: Joint,
+    spare: Vec<Sigma>,
 }
 
 /// A predicted relative pose.
@@ -130,33 +138,41 @@ impl Belief {
 
     /// Joint covariance of the newest pose with every pose, marginalised ones left out: from the
     /// roots down, each clique's joint covariance from its parent's.
-    pub fn joint_all(&self, structure: &Structure) -> Result<Joint, SmoothError> {
+    pub fn joint_all<'a>(
+        &self,
+        structure: &Structure,
+        room: &'a mut JointRoom,
+    ) -> Result<&'a Joint, SmoothError> {
         let newest = self.len().saturating_sub(1) as u32;
         self.check(structure, newest)?;
+        let JointRoom { joint, spare } = room;
+        let others = &mut joint.others;
         // The origin's are zero; those of marginalised poses are left out at the end.
         let zeros = |j: usize| JointPart { j: j as u32, marginal: Matrix3::zeros(), cross: Matrix3::zeros() };
-        let mut others: Vec<JointPart> = (0..self.len()).map(zeros).collect();
-        self.descend(structure, |frontals, sigma| {
+        others.clear();
+        others.extend((0..self.len()).map(zeros));
+        self.descend(structure, spare, |frontals, sigma| {
             if let Some(k) = frontals.iter().position(|&p| p == newest) {
                 sigma.begin_newest(k);
             }
             for (k, &j) in frontals.iter().enumerate() {
-                others[j as usize] = JointPart { j, marginal: sigma.marginal(k), cross: sigma.cross(k) };
+                let part = &mut others[j as usize];
+                (part.marginal, part.cross) = (sigma.marginal(k), sigma.cross(k));
             }
         })?;
-        let marginal = others[newest as usize].marginal;
+        (joint.newest, joint.marginal) = (newest, others[newest as usize].marginal);
         others.retain(|p| structure.check_pose(p.j).is_ok());
-        Ok(Joint { newest, marginal, others })
+        Ok(joint)
     }
 
     /// Covariances of each clique, from the roots down; `visit` gets its frontals and them.
     fn descend(
         &self,
         structure: &Structure,
+        spare: &mut Vec<Sigma>,
         mut visit: impl FnMut(&[u32], &mut Sigma),
     ) -> Result<(), SmoothError> {
         let cliques = &structure.tree.cliques;
-        let mut spare: Vec<Sigma> = Vec::new();
         let mut stack: Vec<(u32, Option<Rc<Sigma>>)> = Vec::new();
         let roots = cliques.iter().enumerate().filter(|(_, c)| c.frontals > 0 && c.parent == NONE);
         stack.extend(roots.map(|(c, _)| (c as u32, None)));

@@ -53,7 +53,7 @@ mod tree;
 mod update;
 
 pub use belief::Belief;
-pub use covariance::{Joint, JointPart, Relative};
+pub use covariance::{Joint, JointPart, JointRoom, Relative};
 pub use factor::Factor;
 pub use smoother::Smoother;
 pub use structure::Structure;

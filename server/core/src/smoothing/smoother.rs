@@ -1,6 +1,6 @@
 //! Smoothing of a single graph: a structure and the one belief about it.
 
-use super::{Belief, Factor, FactorId, Joint, Relative, SmoothError, Structure, Work};
+use super::{Belief, Factor, FactorId, Joint, JointRoom, Relative, SmoothError, Structure, Work};
 use crate::geometry::Pose2;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -132,8 +132,8 @@ impl Smoother {
     }
 
     /// See [`Belief::joint_all`].
-    pub fn joint_all(&self) -> Result<Joint, SmoothError> {
-        self.belief.joint_all(&self.structure)
+    pub fn joint_all<'a>(&self, room: &'a mut JointRoom) -> Result<&'a Joint, SmoothError> {
+        self.belief.joint_all(&self.structure, room)
     }
 
     /// See [`Belief::relative`].

@@ -2,7 +2,7 @@
 
 use super::dense::chart;
 use super::script::{GOOD, Op, Script, op};
-use crate::smoothing::Smoother;
+use crate::smoothing::{JointRoom, Smoother};
 use nalgebra::Matrix3;
 use proptest::prelude::*;
 use rand::RngExt;
@@ -107,6 +107,17 @@ fn thinning_a_chain_at_the_optimum_changes_nothing() {
                 assert!(near(&got.covariance, &want.covariance), "{seed} {a} {}", got.i);
             }
         }
+    }
+}
+
+#[test]
+fn room_used_for_another_question_changes_no_answer() {
+    let (s, thin, kept) = thinned(3);
+    let mut room = JointRoom::default();
+    for (smoother, len) in [(&s.smoother, 33), (&thin, kept.len()), (&s.smoother, 33)] {
+        let fresh = smoother.joint_all(&mut JointRoom::default()).cloned();
+        assert_eq!(smoother.joint_all(&mut room).cloned(), fresh);
+        assert_eq!(fresh.unwrap().others.len(), len);
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::script::{GOOD, information};
 use crate::geometry::Pose2;
-use crate::smoothing::{Factor, Smoother};
+use crate::smoothing::{Factor, JointRoom, Smoother};
 
 #[test]
 fn a_hundred_thousand_poses_fit_a_small_stack() {
@@ -22,7 +22,7 @@ fn a_hundred_thousand_poses_fit_a_small_stack() {
         assert_eq!((s.len(), copy.len()), (100_001, 100_002));
         drop(s);
         assert!(copy.marginal(100_001).amax() < 0.1);
-        assert_eq!(copy.joint_all().unwrap().others.len(), copy.len());
+        assert_eq!(copy.joint_all(&mut JointRoom::default()).unwrap().others.len(), copy.len());
     };
     let thread = std::thread::Builder::new().stack_size(256 << 10).spawn(tour).unwrap();
     thread.join().unwrap();

@@ -3,6 +3,7 @@
 use super::dense::{chart, derivative};
 use super::script::{Script, op};
 use crate::geometry::Pose2;
+use crate::smoothing::JointRoom;
 use crate::smoothing::factor::{At, residual};
 use nalgebra::{DVector, Matrix3, Vector3};
 use proptest::prelude::*;
@@ -35,7 +36,8 @@ fn check_absolute(s: &Script) -> Result<(), TestCaseError> {
     let covariance = s.graph.covariance(0);
     let scale = if covariance.all.is_empty() { 0.0 } else { covariance.all.amax() };
     let joint = s.smoother.joint(&present).unwrap();
-    let all = s.smoother.joint_all().unwrap();
+    let mut room = JointRoom::default();
+    let all = s.smoother.joint_all(&mut room).unwrap();
     prop_assert_eq!((joint.newest, all.newest), (t, t));
     prop_assert!(near(&joint.marginal, &covariance.block(t, t), scale));
     prop_assert!(near(&all.marginal, &covariance.block(t, t), scale));
