@@ -12,8 +12,9 @@ use crate::language::{
 };
 use crate::ledger::Ledger;
 use crate::particle::Particle;
+use crate::second_look::gained;
 use rayon::prelude::*;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Groundings less probable are not kept.
@@ -43,7 +44,7 @@ impl Filter {
             ledger.enter_name(name);
         }
         let (ledger, by_paper) = (&self.ledger, self.config.rules == Rules::Paper);
-        self.particles.par_iter_mut().for_each(|p| {
+        let ground = |p: &mut Particle| {
             let scene = Scene {
                 places: places(&poses(p), path_m),
                 labels: &p.labels,
@@ -53,8 +54,10 @@ impl Filter {
                 by_paper,
             };
             let grounded = scene.grounded(parse);
-            p.labels.reground(utterance, &grounded);
-        });
+            gained(&p.labels.reground(utterance, &grounded), &grounded)
+        };
+        let gained: Vec<Vec<Vertex>> = self.particles.par_iter_mut().map(ground).collect();
+        self.named_anew(gained.into_iter().flatten().collect::<BTreeSet<_>>());
     }
 
     /// Grounds some descriptions again, one after the other in turn, in the map as it is now.

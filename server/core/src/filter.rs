@@ -19,7 +19,7 @@ use crate::weigh::{Choice, Judgement, add_edge, choose, judge};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
 
 /// The posterior over semantic graphs, and what all particles share.
@@ -37,7 +37,9 @@ pub struct Filter {
     pub particles: Vec<Particle>,
     loops: Loops,
     /// Factors that some particles hold and others don't.
-    disputed: Vec<FactorId>,
+    pub(crate) disputed: Vec<FactorId>,
+    /// Places named anew since they were left, oldest first; see [`crate::second_look`].
+    pub(crate) named_anew: VecDeque<Vertex>,
 }
 
 impl Filter {
@@ -52,6 +54,7 @@ impl Filter {
             particles,
             loops: Loops::default(),
             disputed: Vec::new(),
+            named_anew: VecDeque::new(),
         }
     }
 
@@ -61,12 +64,9 @@ impl Filter {
         let t = self.graph.add(frozen); // v_t
         self.extend(&chain); // its edge to v_{t-1}
         let proposals = if self.config.loops { self.propose(t) } else { Vec::new() }; // 1. edges e_tj, (5–9)
-        let mut measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
-        inject(&self.config, t, &mut measured.fits);
-        let mut effects = refusals(t, &measured);
-        for fit in &measured.fits {
-            effects.push(self.take_or_refuse(t, fit)); // 1, 2 and 4: G, X and w, (10), (17–18)
-        }
+        let measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
+        let mut effects = self.weigh_measured(t, measured); // 1, 2 and 4: G, X and w, (10), (17–18)
+        effects.extend(self.look_again()); // the same for a place that was named since it was left
         self.reground(); // 3. L: edges carry labels over; descriptions are grounded in the map as it is now
         normalise(&mut self.particles);
         self.particles = merge(std::mem::take(&mut self.particles));
@@ -142,6 +142,14 @@ impl Filter {
         union.into_values().collect()
     }
 
+    /// All that was measured at place t.
+    pub(crate) fn weigh_measured(&mut self, t: Vertex, mut measured: Measured) -> Effects {
+        inject(&self.config, t, &mut measured.fits);
+        let mut effects = refusals(t, &measured);
+        effects.extend(measured.fits.iter().map(|fit| self.take_or_refuse(t, fit)));
+        effects
+    }
+
     /// Each particle takes the edge of a fit or refuses it, and is weighed by the fit.
     fn take_or_refuse(&mut self, t: Vertex, fit: &Fit) -> Effect {
         let (structure, config) = (&self.structure, &self.config);
@@ -167,7 +175,7 @@ impl Filter {
     }
 
     /// Takes out the factors that no particle holds any more.
-    fn forget(&mut self) {
+    pub(crate) fn forget(&mut self) {
         let (structure, particles) = (&mut self.structure, &self.particles);
         self.disputed.retain(|&factor| {
             let holders = particles.iter().filter(|p| p.belief.holds(factor)).count();

@@ -116,22 +116,27 @@ impl Labels {
     }
 
     /// Grounds an utterance anew: what it was grounded to before is replaced.
-    pub fn reground(&mut self, utterance: u32, grounded: &[Evidence]) {
-        let before =
-            self.evidence.iter().filter(|e| e.utterance == utterance && e.source == Source::Grounded);
-        if !before.eq(grounded) {
-            self.drop_if(|e| e.utterance == utterance && e.source == Source::Grounded);
+    /// Returns that.
+    pub fn reground(&mut self, utterance: u32, grounded: &[Evidence]) -> Vec<Evidence> {
+        let of_it = |e: &Evidence| e.utterance == utterance && e.source == Source::Grounded;
+        let before: Vec<Evidence> = self.evidence.iter().filter(|e| of_it(e)).copied().collect();
+        if before != grounded {
+            self.drop_if(of_it);
             Arc::make_mut(&mut self.evidence).extend_from_slice(grounded);
         }
+        before
     }
 
-    /// Looks up anew what the names mean.
-    pub fn resolve(&mut self, meant: impl Fn(LabelId) -> LabelId) {
-        if self.evidence.iter().any(|e| e.label != meant(e.said)) {
+    /// Looks up anew what the names mean. Returns the places whose names mean something else now.
+    pub fn resolve(&mut self, meant: impl Fn(LabelId) -> LabelId) -> Vec<Vertex> {
+        let is_other = |e: &&Evidence| e.label != meant(e.said);
+        let others: Vec<Vertex> = self.evidence.iter().filter(is_other).map(|e| e.place).collect();
+        if !others.is_empty() {
             for e in Arc::make_mut(&mut self.evidence) {
                 e.label = meant(e.said);
             }
         }
+        others
     }
 
     fn drop_if(&mut self, unwanted: impl Fn(&Evidence) -> bool) -> bool {
@@ -233,6 +238,20 @@ impl Labels {
         if !carried.is_empty() {
             Arc::make_mut(&mut self.evidence).extend(carried);
         }
+    }
+
+    /// Without an edge, what it carried from either end to the other is gone.
+    pub fn carry_back(&mut self, i: Vertex, j: Vertex) {
+        let direct = |utterance, place| {
+            let named = |e: &Evidence| matches!(e.source, Source::Direct | Source::DirectOther);
+            self.evidence.iter().any(|e| e.utterance == utterance && e.place == place && named(e))
+        };
+        let carried = |e: &&Evidence| {
+            let from = if e.place == i { j } else { i };
+            e.source == Source::Carried && [i, j].contains(&e.place) && direct(e.utterance, from)
+        };
+        let unwanted: Vec<Evidence> = self.evidence.iter().filter(carried).copied().collect();
+        self.drop_if(|e| unwanted.contains(e));
     }
 }
 

@@ -36,6 +36,7 @@ pub mod query;
 pub mod random;
 pub mod resample;
 pub mod scan;
+mod second_look;
 pub mod smoothing;
 pub mod snapshot;
 mod take_in;

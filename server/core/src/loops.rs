@@ -54,8 +54,8 @@ pub struct Fit {
     pub mode: Mode,
     /// How this edge was proposed.
     pub kind: EdgeKind,
-    /// How the revisit was first proposed.
-    origin: EdgeKind,
+    /// The pair (older, newer) whose names led to the revisit, if any did.
+    pub named: Option<(Vertex, Vertex)>,
     /// Places that agree with it, itself included.
     pub support: u32,
     /// Path over which they agree, metres.
@@ -68,7 +68,8 @@ impl Fit {
     /// A fit that `support` places agree with, a metre apart.
     #[cfg(test)]
     pub fn supported_by(i: Vertex, mode: Mode, kind: EdgeKind, support: u32) -> Self {
-        Self { i, mode, kind, origin: kind, support, support_path_m: f64::from(support), age: 0 }
+        let named = (kind == EdgeKind::Semantic).then_some((i, i + 20));
+        Self { i, mode, kind, named, support, support_path_m: f64::from(support), age: 0 }
     }
 
     /// Whether enough places agree for it to count.
@@ -79,9 +80,10 @@ impl Fit {
     /// Kind of the next edge of the same revisit. Of one that words proposed the first edge is a semantic
     /// one, at the pair that was named or where enough places agree; what follows is near by then.
     fn kind_of_next(&self) -> EdgeKind {
-        match self.origin {
-            EdgeKind::Semantic if self.supported() => EdgeKind::Distance,
-            other => other,
+        match self.named {
+            Some(_) if self.supported() => EdgeKind::Distance,
+            Some(_) => EdgeKind::Semantic,
+            None => self.kind,
         }
     }
 
@@ -134,38 +136,8 @@ impl Loops {
         let mut measured = Measured::default();
         let leads: Vec<Lead> = self.followed.iter().filter_map(|f| lead(graph, f, t)).collect();
         let mut fits: Vec<Fit> = leads.par_iter().filter_map(|l| follow(graph, t, l)).collect();
-        match_new(graph, t, proposals);
-        for p in proposals {
-            // What is not matched now is proposed again from the next place, a metre on.
-            let Some(Matched { modes: found }) = graph.memo.get(&(p.i, t)) else { continue };
-            measured.refused.extend(refusal(p, t, found));
-            fits.extend(found.iter().filter(|m| good(m)).map(|m| Fit {
-                i: p.i,
-                mode: *m,
-                kind: p.kind,
-                origin: p.kind,
-                support: 1,
-                support_path_m: 0.0,
-                age: 0,
-            }));
-        }
-        let mut fits = distinct(graph, fits);
-        let mut unsupported = 0;
-        fits.retain(|f| {
-            unsupported += usize::from(!f.supported());
-            f.supported() || unsupported <= UNSUPPORTED_AT_ONCE
-        });
-        fits.par_iter_mut().filter(|f| !f.supported()).for_each(|f| look_back(graph, t, f));
-        for f in fits.iter().filter(|f| !f.supported()) {
-            measured.refused.push(Refusal {
-                i: f.i,
-                kind: f.kind,
-                reason: format!(
-                    "edge {t}–{} refused: {} places over {:.1} m agree, {SUPPORT_MIN} over {SUPPORT_PATH_M} needed",
-                    f.i, f.support, f.support_path_m
-                ),
-            });
-        }
+        fits.extend(matched(graph, t, proposals, &mut measured));
+        let mut fits = supported(graph, t, fits, &mut measured);
         fits.retain(|f| f.supported() || f.age < UNSUPPORTED_MAX);
         // Looking back has changed who is supported.
         fits.sort_by_key(|f| std::cmp::Reverse((f.supported(), f.support)));
@@ -174,6 +146,53 @@ impl Loops {
         self.followed = fits;
         measured
     }
+}
+
+/// Matches a place left long ago with older ones; the places around it have been seen by now.
+pub fn measure_again(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) -> Measured {
+    let mut measured = Measured::default();
+    let fits = matched(graph, t, proposals, &mut measured);
+    let mut fits = supported(graph, t, fits, &mut measured);
+    fits.retain(Fit::supported);
+    measured.fits = fits;
+    measured
+}
+
+/// Good fits of place `t` with those proposed.
+fn matched(graph: &mut Graph, t: Vertex, proposals: &[Proposal], measured: &mut Measured) -> Vec<Fit> {
+    match_new(graph, t, proposals);
+    let mut fits = Vec::new();
+    for p in proposals {
+        // What is not matched now is proposed again from the next place, a metre on.
+        let Some(Matched { modes: found }) = graph.memo.get(&(p.i, t)) else { continue };
+        measured.refused.extend(refusal(p, t, found));
+        let named = (p.kind == EdgeKind::Semantic).then_some((p.i, t));
+        let fit =
+            |m: &Mode| Fit { i: p.i, mode: *m, kind: p.kind, named, support: 1, support_path_m: 0.0, age: 0 };
+        fits.extend(found.iter().filter(|m| good(m)).map(fit));
+    }
+    fits
+}
+
+/// One fit per revisit, the best supported first, once the places around `t` were asked. Few of those
+/// without support are kept.
+fn supported(graph: &Graph, t: Vertex, fits: Vec<Fit>, measured: &mut Measured) -> Vec<Fit> {
+    let mut fits = distinct(graph, fits);
+    let mut unsupported = 0;
+    fits.retain(|f| {
+        unsupported += usize::from(!f.supported());
+        f.supported() || unsupported <= UNSUPPORTED_AT_ONCE
+    });
+    fits.par_iter_mut().filter(|f| !f.supported()).for_each(|f| look_around(graph, t, f));
+    measured.refused.extend(fits.iter().filter(|f| !f.supported()).map(|f| Refusal {
+        i: f.i,
+        kind: f.kind,
+        reason: format!(
+            "edge {t}–{} refused: {} places over {:.1} m agree, {SUPPORT_MIN} over {SUPPORT_PATH_M} needed",
+            f.i, f.support, f.support_path_m
+        ),
+    }));
+    fits
 }
 
 fn good(mode: &Mode) -> bool {
@@ -255,7 +274,7 @@ fn follow(graph: &Graph, t: Vertex, lead: &Lead) -> Option<Fit> {
         i: lead.i,
         mode,
         kind: lead.from.kind_of_next(),
-        origin: lead.from.origin,
+        named: lead.from.named,
         support: lead.from.support + 1,
         support_path_m: lead.from.support_path_m + step_m,
         age: lead.from.age + 1,
@@ -273,26 +292,27 @@ fn agreeing(graph: &Graph, i: Vertex, j: Vertex, guess: &Pose2) -> Option<Mode> 
     (good(&mode) && off.x_m.hypot(off.y_m) < AGREE_M && off.yaw_rad.abs() < AGREE_RAD).then_some(mode)
 }
 
-/// Asks the places before `t` whether they agree with a fit of `t`.
-fn look_back(graph: &Graph, t: Vertex, fit: &mut Fit) {
-    let path_m = graph.place(t).path_m;
+/// Asks the places before `t`, and if it was left long ago those after it, whether they agree with a fit
+/// of `t`.
+fn look_around(graph: &Graph, t: Vertex, fit: &mut Fit) {
+    let path_m = |v| graph.place(v).path_m;
     let (mut support, mut support_path_m) = (1, 0.0);
-    for step in 1..SUPPORT_MIN {
-        let back_m = f64::from(step) * SUPPORT_STEP_M;
-        let Some(b) = graph
-            .along(t, back_m + 2.0 * SUPPORT_STEP_M)
-            .rev()
-            .find(|&b| path_m - graph.place(b).path_m >= back_m)
-        else {
-            break;
-        };
-        let guess = fit.mode.i_from_j.compose(&graph.chained(t, b));
-        let Some((i, guess)) = nearest_on_path(graph, fit.i, &guess, b) else { break };
-        if agreeing(graph, i, b, &guess).is_none() {
-            break;
+    for side in [-1.0, 1.0] {
+        let mut agreed_m = 0.0;
+        for step in 1..SUPPORT_MIN {
+            let away_m = f64::from(step) * SUPPORT_STEP_M;
+            let on_side_m = |b: Vertex| side * (path_m(b) - path_m(t));
+            let on_side = graph.along(t, away_m + 2.0 * SUPPORT_STEP_M).filter(|&b| on_side_m(b) >= away_m);
+            let Some(b) = on_side.min_by(|&a, &b| on_side_m(a).total_cmp(&on_side_m(b))) else { break };
+            let guess = fit.mode.i_from_j.compose(&graph.chained(t, b));
+            let Some((i, guess)) = nearest_on_path(graph, fit.i, &guess, b) else { break };
+            if agreeing(graph, i, b, &guess).is_none() {
+                break;
+            }
+            support += 1;
+            agreed_m = on_side_m(b);
         }
-        support += 1;
-        support_path_m = path_m - graph.place(b).path_m;
+        support_path_m += agreed_m;
     }
     fit.support = fit.support.max(support);
     fit.support_path_m = fit.support_path_m.max(support_path_m);
@@ -316,7 +336,7 @@ fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
         };
         match kept.values_mut().find(same) {
             Some(k) if f.kind == EdgeKind::Semantic && k.kind != EdgeKind::Semantic => {
-                (k.i, k.mode, k.kind) = (f.i, f.mode, f.kind);
+                (k.i, k.mode, k.kind, k.named) = (f.i, f.mode, f.kind, f.named);
             }
             Some(_) => {}
             None => {

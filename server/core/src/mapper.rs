@@ -69,7 +69,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 4 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 5 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -259,7 +259,7 @@ impl Mapper {
         self.place_waiting(None, effects);
         let frozen = self.track.front.freeze(f64::INFINITY);
         self.grow(frozen, effects);
-        self.filter.reground_all();
+        self.change(effects, Filter::finish);
     }
 
     /// The robot in the best particle's map.
@@ -379,6 +379,7 @@ mod tests {
             kind: EdgeKind::Distance,
             i_from_j: Pose2::default(),
             covariance: Matrix3::identity(),
+            named: None,
             factor: 0,
         };
         let other = mapper.filter.best().clone();

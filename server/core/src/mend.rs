@@ -2,8 +2,11 @@
 
 use crate::event::Command;
 use crate::filter::Filter;
+use crate::graph::Vertex;
 use crate::language::Name;
+use crate::particle::Particle;
 use crate::resample::normalise;
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 impl Filter {
@@ -17,7 +20,7 @@ impl Filter {
     }
 
     /// Takes back a sentence, the newest that stands if none is named: labels and weights are as if it
-    /// had never been said. Edges that it proposed stay, for they stand on scans.
+    /// had never been said. Edges that it led to are judged again.
     pub(crate) fn undo(&mut self, id: Option<&str>) -> Result<String, String> {
         let Some(number) = self.ledger.standing(id) else {
             return Err(match id {
@@ -26,19 +29,26 @@ impl Filter {
                 None => "there is no sentence left to take back".to_owned(),
             });
         };
-        self.strike(number);
+        let given_up = self.strike(number);
         let text = &self.ledger.entries()[number as usize].text;
-        Ok(format!("I took back: \"{text}\"."))
+        let loops = match given_up {
+            0 => String::new(),
+            1 => " A loop that it had led to is given up.".to_owned(),
+            n => format!(" {n} loops that it had led to are given up."),
+        };
+        Ok(format!("I took back: \"{text}\".{loops}"))
     }
 
-    /// The same by the sentence's number in the ledger.
-    pub(crate) fn strike(&mut self, number: u32) {
+    /// The same by the sentence's number in the ledger. Returns how many loops were given up with it.
+    pub(crate) fn strike(&mut self, number: u32) -> usize {
         Arc::make_mut(&mut self.ledger).strike(number);
         for p in &mut self.particles {
             p.revoke(number);
         }
         self.resolve();
+        let given_up = self.judge_again();
         self.rank();
+        given_up
     }
 
     fn rename(&mut self, from: &str, to: &str) -> Result<String, String> {
@@ -79,9 +89,9 @@ impl Filter {
     /// Looks up anew what the names mean, in every particle.
     pub(crate) fn resolve(&mut self) {
         let ledger = &self.ledger;
-        for p in &mut self.particles {
-            p.labels.resolve(|said| ledger.meant(said));
-        }
+        let resolve = |p: &mut Particle| p.labels.resolve(|said| ledger.meant(said));
+        let others: BTreeSet<Vertex> = self.particles.iter_mut().flat_map(resolve).collect();
+        self.named_anew(others);
     }
 }
 

@@ -25,6 +25,8 @@ pub struct Edge {
     pub i_from_j: Pose2,
     /// Covariance of it, right perturbation.
     pub covariance: Matrix3<f64>,
+    /// The pair (older, newer) whose names led to the revisit, if any did.
+    pub named: Option<(Vertex, Vertex)>,
     /// Its factor in the structure that all particles share.
     pub factor: FactorId,
 }
@@ -74,6 +76,16 @@ impl Particle {
         Arc::make_mut(&mut self.edges).push(edge);
     }
 
+    /// Takes edges out of G, and what was carried over them out of L; X follows at the next update.
+    pub fn give_up(&mut self, unwanted: impl Fn(&Edge) -> bool) {
+        let (gone, kept): (Vec<Edge>, Vec<Edge>) = self.edges.iter().cloned().partition(unwanted);
+        for edge in &gone {
+            self.belief.release(edge.factor);
+            self.labels.carry_back(edge.i, edge.j);
+        }
+        self.edges = Arc::new(kept);
+    }
+
     /// X given G, eq. (10). On an error poses stay where they were, and covariances are unknown.
     pub fn update(&mut self, structure: &Structure) -> Result<(), SmoothError> {
         self.belief.update(structure)?;
@@ -98,8 +110,8 @@ impl Particle {
         }
     }
 
-    /// Takes back what an utterance put into labels and weight. Edges that it proposed stay: they stand
-    /// on scans that agree.
+    /// Takes back what an utterance put into labels and weight. For the edges that it proposed see
+    /// [`crate::second_look`].
     pub fn revoke(&mut self, utterance: u32) {
         self.labels.revoke(utterance);
         if let Some(at) = self.said.iter().position(|(u, _)| *u == utterance) {

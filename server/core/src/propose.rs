@@ -28,7 +28,7 @@ pub const RELOCALISATION_P: f64 = 0.2;
 const STAYED_P: f64 = 0.9;
 const STAYED_PATH_M: f64 = 3.0;
 /// Similarities below are chance.
-const SIMILARITY_MIN: f64 = 0.02;
+pub const SIMILARITY_MIN: f64 = 0.02;
 
 /// A pair to look at.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -125,6 +125,20 @@ pub fn propose(
         merge_semantic(&mut proposals, particle.labels.similar(t), matchable);
     }
     draw(config.seed, graph, t, particle.count, proposals)
+}
+
+/// What equal particles would look at for the names of a place, wherever the robot is now: any other
+/// place left, older or newer.
+pub fn propose_named(config: &Config, graph: &Graph, particle: &Particle, v: Vertex) -> Vec<Proposal> {
+    if !config.semantic_edges {
+        return Vec::new();
+    }
+    let left = graph.places().len() as Vertex;
+    let mut proposals = Vec::new();
+    merge_semantic(&mut proposals, particle.labels.similar(v), |i| {
+        i < left && graph.apart(i, v, LOCAL_PATH_M)
+    });
+    draw(config.seed, graph, v, particle.count, proposals)
 }
 
 /// Eqs. (8–9): an edge that the words propose too is a semantic one, of either's probability.

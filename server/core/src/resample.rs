@@ -114,6 +114,7 @@ mod tests {
                 kind: EdgeKind::Distance,
                 i_from_j: Pose2::default(),
                 covariance: nalgebra::Matrix3::identity(),
+                named: None,
                 factor: k as u32,
             };
             Particle { edges: Arc::new(vec![edge]), log_weight: f64::ln(weight), count, ..Particle::empty(1) }

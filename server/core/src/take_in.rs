@@ -69,6 +69,7 @@ impl Filter {
             }
             p.labels.add(evidence);
         }
+        self.named_anew([place]);
         self.reground_about(label, saying.here.poses, &saying.here.path_m);
     }
 
@@ -112,6 +113,7 @@ impl Filter {
                 ));
             }
         }
+        self.named_anew([a, b]);
     }
 
     /// "This is not the kitchen."
@@ -143,7 +145,9 @@ impl Filter {
             return self.alias(saying, new, old);
         }
         match self.said_before(saying, was, is) {
-            Some(number) => self.strike(number),
+            Some(number) => {
+                self.strike(number);
+            }
             None => was.into_iter().for_each(|was| self.deny(saying, was, certainty)),
         }
         self.take(saying, is, certainty, true);

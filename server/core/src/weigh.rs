@@ -154,7 +154,7 @@ pub fn choose(
     let taken = part(taking, p);
     let mut refused = part(refusing, 1.0 - p);
     if let Some(r) = refused.as_mut().filter(|_| sibling) {
-        r.kept_until = t + SIBLING_KEPT;
+        r.kept_until = r.belief.len() as Vertex - 1 + SIBLING_KEPT;
     }
     Choice { taken, refused, undecided: particle }
 }
@@ -173,7 +173,15 @@ pub fn add_edge(structure: &mut Structure, fit: &Fit, t: Vertex) -> Option<Edge>
         })
         .ok()?;
     structure.arrange();
-    Some(Edge { i: fit.i, j: t, kind: fit.kind, i_from_j: fit.mode.i_from_j, covariance, factor })
+    Some(Edge {
+        i: fit.i,
+        j: t,
+        kind: fit.kind,
+        i_from_j: fit.mode.i_from_j,
+        covariance,
+        named: fit.named,
+        factor,
+    })
 }
 
 impl Choice {

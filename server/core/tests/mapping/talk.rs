@@ -141,3 +141,29 @@ fn the_papers_rules_ground_once() {
     let paper = Config { rules: Rules::Paper, ..Config::default() };
     assert!(where_is(&told_by(paper, &said), "lounge").candidates.is_empty());
 }
+
+/// Two laps in which only names propose loops, the same place called differently in each.
+fn named_apart(said: &[(usize, &str)]) -> Mapper {
+    let mut mapper = Mapper::new(Config { gamma_per_m2: 1e9, ..Config::default() });
+    run(&mut mapper, &events(&drive(2), &laser(), said));
+    mapper.step(Event::Flush);
+    mapper
+}
+
+fn edges(mapper: &Mapper) -> usize {
+    mapper.snapshot().graph().particles[0].edges.len()
+}
+
+#[test]
+fn names_that_come_late_propose_the_edge_between_two_visits_long_past() {
+    let lap = drive(2).len() / 2;
+    let said = [(40, "this is the kitchen"), (lap + 40, "this is the bistro")];
+    let late = (lap + 200, "the kitchen is also called the bistro");
+    assert_eq!(edges(&named_apart(&said)), 0);
+    let mapper = named_apart(&[said[0], said[1], late]);
+    assert!(edges(&mapper) > 0);
+    let mut desk = named_apart(&said);
+    assert!(mend(&mut desk, Command::Rename { from: "bistro".into(), to: "kitchen".into() }).is_ok());
+    desk.step(Event::Flush);
+    assert!(edges(&desk) > 0, "renamed at a desk");
+}
