@@ -8,10 +8,11 @@ use crate::graph::Vertex;
 use crate::labels::{Evidence, LabelId, Labels, Source};
 use crate::language::act::{Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
 use crate::language::{
-    GroundPlace, LandmarkBelief, Narrowing, Reading, Relation, ground_by_paper, ground_clause,
+    GroundPlace, Grounding, LandmarkBelief, Narrowing, Reading, Relation, ground_by_paper, ground_clause,
 };
 use crate::ledger::Ledger;
 use crate::particle::Particle;
+use crate::predictive::log_located;
 use crate::second_look::gained;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -26,7 +27,8 @@ const THIS_M: f64 = 10.0;
 
 impl Filter {
     /// Grounds what a sentence locates in every particle, anew if it was before. `poses` of a
-    /// particle's places, with the path travelled up to each.
+    /// particle's places, with the path travelled up to each. Returns what the sentence says for or
+    /// against each particle, if it locates anything.
     pub(crate) fn ground(
         &mut self,
         utterance: u32,
@@ -34,10 +36,10 @@ impl Filter {
         held: Vertex,
         poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
         path_m: &[f64],
-    ) {
+    ) -> Vec<f64> {
         let figures: Vec<_> = located(parse).iter().filter_map(|(_, l)| l.figure.label()).collect();
         if figures.is_empty() {
-            return;
+            return Vec::new();
         }
         let ledger = Arc::make_mut(&mut self.ledger);
         for name in &figures {
@@ -53,11 +55,13 @@ impl Filter {
                 held: held as usize,
                 by_paper,
             };
-            let grounded = scene.grounded(parse);
-            gained(&p.labels.reground(utterance, &grounded), &grounded)
+            let (grounded, log_ratio) = scene.grounded(parse);
+            (gained(&p.labels.reground(utterance, &grounded), &grounded), log_ratio)
         };
-        let gained: Vec<Vec<Vertex>> = self.particles.par_iter_mut().map(ground).collect();
+        let (gained, log_ratios): (Vec<Vec<Vertex>>, Vec<f64>) =
+            self.particles.par_iter_mut().map(ground).unzip();
         self.named_anew(gained.into_iter().flatten().collect::<BTreeSet<_>>());
+        log_ratios
     }
 
     /// Grounds some descriptions again, one after the other in turn, in the map as it is now.
@@ -128,8 +132,9 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// Δα of all that a sentence locates: for each figure a clause, summed over its readings.
-    fn grounded(&self, parse: &Parse) -> Vec<Evidence> {
+    /// Δα of all that a sentence locates: for each figure a clause, summed over its readings. Beside it
+    /// log p(λ | G), over that of a sentence that says nothing.
+    fn grounded(&self, parse: &Parse) -> (Vec<Evidence>, f64) {
         let mut clauses: BTreeMap<LabelId, Vec<(f64, Locate)>> = BTreeMap::new();
         for (certainty, l) in located(parse) {
             let said = l.figure.label().and_then(|name| self.ledger.said(name.as_str()));
@@ -138,11 +143,12 @@ impl Scene<'_> {
                 clauses.entry(said).or_default().push((certainty, l));
             }
         }
-        let mut grounded = Vec::new();
+        let (mut grounded, mut log_ratio) = (Vec::new(), 0.0);
         for (said, readings) in clauses {
             let label = self.ledger.meant(said);
             let certainty = readings.iter().map(|r| r.0).sum::<f64>().min(1.0);
-            let p = self.place_of(&readings, label);
+            let Grounding { p, likelihood_ratio, .. } = self.place_of(&readings, label);
+            log_ratio += certainty * log_located(likelihood_ratio);
             grounded.extend(p.iter().enumerate().filter(|(_, p)| *p * certainty >= GROUNDED_MIN).map(
                 |(v, p)| {
                     let (utterance, place, weight) = (self.utterance, v as Vertex, certainty * p);
@@ -150,11 +156,11 @@ impl Scene<'_> {
                 },
             ));
         }
-        grounded
+        (grounded, log_ratio)
     }
 
     /// p(figure is place i | λ), eq. (14), given what is located as its readings say.
-    fn place_of(&self, clause: &[(f64, Locate)], figure: LabelId) -> Vec<f64> {
+    fn place_of(&self, clause: &[(f64, Locate)], figure: LabelId) -> Grounding {
         let landmarks: Vec<Vec<Vec<(usize, f64)>>> = clause
             .iter()
             .map(|(_, l)| l.landmarks.iter().map(|phrase| self.landmark(phrase)).collect())
@@ -162,7 +168,8 @@ impl Scene<'_> {
         if self.by_paper {
             let of_first = landmarks[0].first().into_iter().flatten();
             let likeliest = of_first.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
-            return ground_by_paper(clause[0].1.relation, &self.places, likeliest.map(|l| l.0));
+            let p = ground_by_paper(clause[0].1.relation, &self.places, likeliest.map(|l| l.0));
+            return Grounding { p, p_elsewhere: 0.0, likelihood_ratio: 1.0 };
         }
         let beliefs: Vec<Vec<LandmarkBelief>> = clause
             .iter()
@@ -181,7 +188,7 @@ impl Scene<'_> {
                 landmarks,
             })
             .collect();
-        ground_clause(&readings, &self.places, self.held, &self.applies(figure)).p
+        ground_clause(&readings, &self.places, self.held, &self.applies(figure))
     }
 
     /// Where a landmark may be: (place, probability), summing to at most one; empty if nobody knows.
@@ -287,7 +294,13 @@ fn narrowing(modifiers: &Modifiers, landmark: Option<&Phrase>) -> Narrowing {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Config;
+    use crate::effects::HeardStatus;
+    use crate::event::Utterance;
     use crate::language::parse;
+    use crate::listen::Here;
+    use crate::smoothing::Factor;
+    use nalgebra::{Matrix3, Vector3};
 
     #[test]
     fn a_door_counted_along_the_way_is_located_and_may_be_whose() {
@@ -303,5 +316,43 @@ mod tests {
             assert_eq!((l.relation, l.modifiers.count), (relation, count), "{text}");
             assert!(l.figure.label().is_some(), "{text}");
         }
+    }
+
+    /// Two particles that know a gym and a kitchen, in the first 20 m and in the second 3 m apart, and the
+    /// log-weight of the second over that of the first once a sentence is said on the way.
+    fn weighed(sentence: &str) -> f64 {
+        let mut filter = Filter::new(Config::default());
+        let structure = Arc::make_mut(&mut filter.structure);
+        for _ in 0..21 {
+            let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
+            structure.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
+        }
+        let i_from_j = Pose2::new(3.0, 0.0, 0.0);
+        let tie =
+            structure.add_factor(Factor { i: 0, j: 20, i_from_j, information: Matrix3::identity() * 1e6 });
+        structure.arrange();
+        let mut apart = Particle::empty(1);
+        let mut near = Particle::empty(1);
+        near.belief.hold(tie.unwrap());
+        for p in [&mut apart, &mut near] {
+            p.update(structure).unwrap();
+        }
+        filter.particles = vec![apart, near];
+        let path_m: Vec<f64> = (0..21).map(f64::from).collect();
+        for (held, text) in [(0, "this is the gym"), (20, "this is the kitchen"), (10, sentence)] {
+            let here = Here { held: Some(held), poses: &|p| p.belief.poses(), path_m: path_m.clone() };
+            let u = Utterance { id: text.into(), text: text.into(), ..Utterance::default() };
+            assert_eq!(filter.hear(&u, &here).status, HeardStatus::Understood);
+        }
+        let length_m = |p: &Particle| p.belief.pose(20).x_m;
+        let (near, apart): (Vec<_>, Vec<_>) = filter.particles.iter().partition(|p| length_m(p) < 10.0);
+        near[0].log_weight - apart[0].log_weight
+    }
+
+    #[test]
+    fn a_description_speaks_for_the_map_in_which_it_is_true() {
+        let nothing = weighed("the lounge is near the cafe");
+        assert!(weighed("the kitchen is near the gym") > nothing + 0.5);
+        assert!(weighed("the kitchen is twenty meters from the gym") < nothing - 1.0);
     }
 }

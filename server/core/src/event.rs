@@ -84,7 +84,7 @@ pub struct Scan {
 }
 
 /// A sentence said to the robot.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Utterance {
     /// Unique id; a second one with the same id changes nothing.
     pub id: String,

@@ -9,7 +9,8 @@
 //!
 //! the Dirichlet-multinomial over the joined evidence, and ε for talk that is false or misheard.
 //! p₀ is how often a name is said of anything: a rare name where it is known to be is strong
-//! evidence, "hallway" is weak.
+//! evidence, "hallway" is weak. A description weighs by the 1/Z of eq. (16): what is known of its figure,
+//! times how well that lies as described.
 
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
@@ -55,6 +56,11 @@ pub fn log_label(
 pub fn log_denied(labels: &Labels, poses: &[Pose2], (v, label): (Vertex, LabelId)) -> f64 {
     let is = probability(near(labels, poses, v, label).of_label);
     bounded((1.0 - FALSE_TALK) * (1.0 - is) + FALSE_TALK)
+}
+
+/// The same for a sentence that locates, of its [`crate::language::Grounding::likelihood_ratio`].
+pub fn log_located(likelihood_ratio: f64) -> f64 {
+    bounded((1.0 - FALSE_TALK) * likelihood_ratio + FALSE_TALK)
 }
 
 fn bounded(ratio: f64) -> f64 {

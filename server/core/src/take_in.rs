@@ -33,7 +33,10 @@ impl Filter {
             }
         }
         let poses = here.poses;
-        self.ground(utterance, parse, held, &|p| poses(p), &here.path_m);
+        let log_ratios = self.ground(utterance, parse, held, &|p| poses(p), &here.path_m);
+        for (p, log_ratio) in self.particles.iter_mut().zip(log_ratios) {
+            p.weigh_by_words(utterance, log_ratio);
+        }
         self.rank();
     }
 

@@ -33,6 +33,9 @@ pub struct Grounding {
     pub p: Vec<f64>,
     /// Probability that the figure is not in the map yet.
     pub p_elsewhere: f64,
+    /// p(clause) by what is known of the figure, over that of a clause that says nothing: above 1 where
+    /// what is called so lies as described, below where it does not, 1 where nobody knows.
+    pub likelihood_ratio: f64,
 }
 
 /// Landmark hypotheses summed over, per reading; the likeliest are kept.
@@ -85,12 +88,12 @@ pub fn ground_clause(
     let elsewhere = (1.0 - known) * (1.0 - (1.0 - NOT_YET) * (seen * cap));
     let z = p.iter().sum::<f64>() + elsewhere; // 1/Z of (16)
     if !(z.is_finite() && z > 0.0) {
-        return Grounding { p: vec![0.0; places.len()], p_elsewhere: 1.0 };
+        return Grounding { p: vec![0.0; places.len()], p_elsewhere: 1.0, likelihood_ratio: 1.0 };
     }
     for x in &mut p {
         *x /= z;
     }
-    Grounding { p, p_elsewhere: elsewhere / z }
+    Grounding { p, p_elsewhere: elsewhere / z, likelihood_ratio: z }
 }
 
 /// Σ over readings, frames and landmarks of their probability times f(figure, landmark), per m² at every
