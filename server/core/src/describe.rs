@@ -9,6 +9,7 @@ use crate::labels::{Evidence, LabelId, Labels, Source};
 use crate::language::act::{Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
 use crate::language::{
     GroundPlace, Grounding, LandmarkBelief, Narrowing, Reading, Relation, ground_by_paper, ground_clause,
+    pointed_to, seen_from_here,
 };
 use crate::ledger::Ledger;
 use crate::particle::Particle;
@@ -243,6 +244,8 @@ impl Scene<'_> {
 /// What the readings of a text locate, each with the probability that it is said and meant.
 pub(crate) fn located(parse: &Parse) -> Vec<(f64, Locate)> {
     let of = |content: &Content| match content {
+        Content::Label { at, what, .. } if at.head == Head::There => Some(pointed_to(what)),
+        Content::Locate(l) if l.figure.head == Head::Here => seen_from_here(l),
         Content::Locate(l) => Some(by_doors(l)),
         // "The last office on the left is Nick's".
         Content::Alias { what, also } => described(also, what),
@@ -253,7 +256,9 @@ pub(crate) fn located(parse: &Parse) -> Vec<(f64, Locate)> {
         _ => None,
     };
     let acts = parse.analyses.iter().flat_map(|a| a.acts.iter().map(|act| (a.weight * act.certainty, act)));
-    acts.filter_map(|(p, act)| Some((p, of(&act.content)?))).collect()
+    let there = |l: &Locate| l.relation == Relation::At && l.landmarks.iter().any(|p| p.head == Head::There);
+    let all = acts.filter_map(|(p, act)| Some((p, of(&act.content)?)));
+    all.map(|(p, l)| (p, if there(&l) { pointed_to(&l.figure) } else { l })).collect()
 }
 
 /// "It is the second door on the left": what is at a described spot lies as that is described.
@@ -297,7 +302,7 @@ mod tests {
     use crate::Config;
     use crate::effects::HeardStatus;
     use crate::event::Utterance;
-    use crate::language::parse;
+    use crate::language::{Name, parse};
     use crate::listen::Here;
     use crate::smoothing::Factor;
     use nalgebra::{Matrix3, Vector3};
@@ -316,6 +321,21 @@ mod tests {
             assert_eq!((l.relation, l.modifiers.count), (relation, count), "{text}");
             assert!(l.figure.label().is_some(), "{text}");
         }
+    }
+
+    #[test]
+    fn what_lies_there_or_here_is_located_from_here() {
+        for (text, relation) in [
+            ("that is the gym", Relation::Near),
+            ("the gym is over there", Relation::Near),
+            ("the room over there is the gym", Relation::Near),
+            ("the gym is down the hall", Relation::Down),
+            ("we are right outside the gym", Relation::NextTo),
+        ] {
+            let all = located(&parse(text));
+            assert_eq!((all[0].1.figure.label(), all[0].1.relation), (Name::new("gym"), relation), "{text}");
+        }
+        assert!(located(&parse("this is the gym")).is_empty());
     }
 
     /// Two particles that know a gym and a kitchen, in the first 20 m and in the second 3 m apart, and the

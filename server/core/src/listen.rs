@@ -2,13 +2,13 @@
 
 use crate::describe::located;
 use crate::effects::{Heard, HeardStatus, PlaceId};
-use crate::event::Utterance;
+use crate::event::{StampNs, Utterance};
 use crate::filter::Filter;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::Source;
 use crate::language;
-use crate::language::act::{Content, Parse};
+use crate::language::act::{Content, Head, Parse, Phrase};
 use crate::ledger::{Entry, UTTERANCES_MAX};
 use crate::particle::Particle;
 use std::collections::BTreeMap;
@@ -18,6 +18,8 @@ use std::sync::Arc;
 /// Groundings told to the guide.
 const GROUNDED_TOLD: usize = 5;
 
+/// "It" is what was spoken of no longer ago.
+const TOPIC_NS: i64 = 60_000_000_000;
 /// Less is "not seen yet".
 const NOT_SEEN_MAX: f64 = 0.3;
 /// So near is "here".
@@ -66,7 +68,8 @@ impl Filter {
     }
 
     fn hear_anew(&mut self, u: &Utterance, here: &Here) -> Heard {
-        let parse = language::parse_hearings(&u.text, &u.alternatives);
+        let mut parse = language::parse_hearings(&u.text, &u.alternatives);
+        language::resolve_it(&mut parse, self.topic(u.began_ns));
         let words = self.words(&parse);
         if parse.acts().iter().all(|act| matches!(act.content, Content::Ignored(_))) {
             return heard(u, HeardStatus::NotUnderstood, &parse, words);
@@ -95,10 +98,18 @@ impl Filter {
         self.take_in(number, &parse, held, here);
         let mut heard = heard(u, HeardStatus::Understood, &parse, words);
         heard.grounded = self.told(number);
+        heard.words += unplaced(&parse);
         if describes {
             heard.words += &self.put(number, held, here);
         }
         heard
+    }
+
+    /// What the newest sentence spoke of, if that is not too long ago for "it".
+    fn topic(&self, now_ns: StampNs) -> Option<&Phrase> {
+        let newest = self.ledger.entries().last().filter(|e| e.stands)?;
+        let since_ns = now_ns.saturating_sub(newest.stamp_ns);
+        (0..=TOPIC_NS).contains(&since_ns).then(|| language::topic(&newest.parse)).flatten()
     }
 
     /// Where a description was put, in words.
@@ -140,6 +151,21 @@ impl Filter {
         told.truncate(GROUNDED_TOLD);
         told
     }
+}
+
+/// What is told of an assertion that was understood, but of nothing that can be put anywhere.
+fn unplaced(parse: &Parse) -> &'static str {
+    let of = |content: &Content| match content {
+        Content::Label { what, .. } if what.label().is_none() => Some(" But I can keep no name of that."),
+        Content::Label { at: Phrase { head: Head::Any | Head::Visited | Head::Place, .. }, .. } => {
+            Some(" But I can't tell which place that is: say it when we are there.")
+        }
+        Content::Locate(l) if l.figure.head == Head::It => {
+            Some(" But I don't know what you speak of: name it.")
+        }
+        _ => None,
+    };
+    parse.acts().iter().find_map(|act| of(&act.content)).unwrap_or_default()
 }
 
 fn heard(u: &Utterance, status: HeardStatus, parse: &Parse, words: String) -> Heard {

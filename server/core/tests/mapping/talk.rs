@@ -167,3 +167,18 @@ fn names_that_come_late_propose_the_edge_between_two_visits_long_past() {
     desk.step(Event::Flush);
     assert!(edges(&desk) > 0, "renamed at a desk");
 }
+
+#[test]
+fn what_can_be_put_nowhere_is_told() {
+    let mut mapper = told(&[KITCHEN]);
+    let later = |k: i64| (120 + k) * 200_000_000 + 100_000_000_000;
+    let mut reply = |k, text: &str| {
+        let effects = mapper.step(Event::Utterance(say(&format!("late{k}"), text, later(k))));
+        let words = |e| if let Effect::Heard(h) = e { Some(h.words) } else { None };
+        effects.into_iter().find_map(words).unwrap()
+    };
+    assert!(reply(0, "it is next to the gym").contains("name it"));
+    assert!(reply(1, "this is where we keep the printers").contains("no name"));
+    assert!(!reply(2, "the lounge is next to the kitchen").contains("But"));
+    assert!(reply(3, "it is across from the gym").contains("the lounge is across from the gym"));
+}

@@ -1,0 +1,123 @@
+//! What "it" and "there" speak of: what was named last, and a place near by that the speaker points to.
+
+use super::act::{Content, Head, Locate, Modifiers, Parse, Phrase};
+use super::relation::Relation;
+
+/// Puts in the place of each "it" what the acts before spoke of, or `before` them the last sentence.
+/// Without either, "it" stays.
+pub fn resolve_it(parse: &mut Parse, before: Option<&Phrase>) {
+    for analysis in &mut parse.analyses {
+        let (mut of_before, mut of_text) = (before.cloned(), None);
+        for act in &mut analysis.acts {
+            if let Some(topic) = of_text.as_ref().or(of_before.as_ref()) {
+                name_it(&mut act.content, topic, of_text.is_some());
+            }
+            if let Some(subject) = subject(&act.content) {
+                (of_before, of_text) = (None, Some(subject.clone()));
+            }
+        }
+    }
+}
+
+/// What a text speaks of at its end.
+pub fn topic(parse: &Parse) -> Option<&Phrase> {
+    parse.acts().iter().rev().find_map(|act| subject(&act.content))
+}
+
+fn subject(content: &Content) -> Option<&Phrase> {
+    match content {
+        Content::Label { what, .. } | Content::Alias { what, .. } => Some(what),
+        Content::Locate(l) => Some(&l.figure),
+        Content::Correct { is, .. } => subject(is),
+        _ => None,
+    }
+    .filter(|phrase| phrase.label().is_some())
+}
+
+fn name_it(content: &mut Content, topic: &Phrase, same_text: bool) {
+    match content {
+        Content::Locate(l) => {
+            for phrase in std::iter::once(&mut l.figure).chain(&mut l.landmarks) {
+                if phrase.head == Head::It {
+                    *phrase = topic.clone();
+                }
+            }
+        }
+        Content::Alias { what, .. } if what.head == Head::It => *what = topic.clone(),
+        // "It is called the bistro": what was just spoken of, wherever that is. Said by itself it is
+        // said of where one stands.
+        Content::Label { at, what, .. } if at.head == Head::It && same_text && what.label().is_some() => {
+            *content = Content::Alias { what: topic.clone(), also: what.clone() };
+        }
+        _ => {}
+    }
+}
+
+/// "That is the gym", "the gym is over there": near who speaks. Nobody told where the finger points.
+pub fn pointed_to(figure: &Phrase) -> Locate {
+    Locate {
+        figure: figure.clone(),
+        relation: Relation::Near,
+        modifiers: Modifiers::default(),
+        landmarks: vec![Phrase::new(Head::Here)],
+        frame: None,
+        repaired: false,
+    }
+}
+
+/// "We are next to the gym" says where the gym is: as the place held lies to it, so it lies to that.
+pub fn seen_from_here(l: &Locate) -> Option<Locate> {
+    let relation = match l.relation {
+        Relation::NextTo | Relation::OutOf | Relation::InFrontOf => Relation::NextTo,
+        Relation::Near | Relation::Past | Relation::Behind | Relation::LeftOf | Relation::RightOf => {
+            Relation::Near
+        }
+        Relation::AcrossFrom => Relation::AcrossFrom,
+        Relation::AwayFrom => Relation::AwayFrom,
+        _ => return None,
+    };
+    let [landmark] = &l.landmarks[..] else { return None };
+    Some(Locate {
+        figure: landmark.clone(),
+        relation,
+        landmarks: vec![l.figure.clone()],
+        frame: None,
+        ..l.clone()
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::language::{parse, words};
+
+    fn resolved(text: &str, before: Option<&str>) -> String {
+        let mut parsed = parse(text);
+        let before = before.map(parse);
+        resolve_it(&mut parsed, before.as_ref().and_then(topic));
+        words(parsed.acts(), |_| true)
+    }
+
+    #[test]
+    fn it_is_what_was_spoken_of_last() {
+        for (text, before, want) in [
+            (
+                "The kitchen is down the hall. It is next to the gym.",
+                None,
+                "and the kitchen is next to the gym",
+            ),
+            ("this is the kitchen, the gym is across from it", None, "the gym is across from the kitchen"),
+            ("it is next to the gym", Some("the cafe is down the hall"), "the cafe is next to the gym"),
+            ("it is next to the gym", Some("where is the cafe?"), "it is next to the gym"),
+            ("it is next to the gym", None, "it is next to the gym"),
+            (
+                "The kitchen is down the hall. It is called the bistro.",
+                None,
+                "the kitchen is also called the bistro",
+            ),
+        ] {
+            let got = resolved(text, before);
+            assert!(got.contains(want), "{text} {before:?}: {got}");
+        }
+    }
+}
