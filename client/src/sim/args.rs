@@ -34,6 +34,19 @@ pub struct SimulateArgs {
     /// Which laser.
     #[arg(long, value_enum, default_value = "front")]
     pub lidar: Lidar,
+    /// Its field of view instead, degrees, centred on where it looks: 10 to 360.
+    #[arg(long, value_name = "DEGREES", value_parser = clap::value_parser!(u16).range(10..=360))]
+    pub fov: Option<u16>,
+    /// Its rays per sweep instead: 20 to 4000.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(20..=4000))]
+    pub beams: Option<u16>,
+    /// How far it sees instead, metres: 1 to 200.
+    #[arg(long, value_name = "METRES", value_parser = clap::value_parser!(u16).range(1..=200))]
+    pub reach: Option<u16>,
+    /// Where it looks, degrees to the left of the robot's nose.
+    #[arg(long, value_name = "DEGREES", allow_negative_numbers = true,
+          value_parser = clap::value_parser!(i16).range(-180..=180))]
+    pub yaw: Option<i16>,
     /// The laser hangs head down: its bearings run clockwise.
     #[arg(long)]
     pub upside_down: bool,
@@ -103,6 +116,23 @@ pub enum SimulateError {
 /// Odometry messages per second beside a laser that sweeps: the server deskews by them.
 const SWEPT_ODOM_RATE_HZ: f64 = 20.0;
 
+/// A laser as asked for.
+fn fit(laser: &mut LaserModel, args: &SimulateArgs) {
+    laser.mount.upside_down = args.upside_down;
+    if let Some(degrees) = args.fov {
+        laser.fov_rad = f64::from(degrees).to_radians();
+    }
+    if let Some(beams) = args.beams {
+        laser.beams = (beams.into(), beams.into());
+    }
+    if let Some(reach_m) = args.reach {
+        laser.mount.range_max_m = reach_m.into();
+    }
+    if let Some(degrees) = args.yaw {
+        laser.mount.yaw_rad = f64::from(degrees).to_radians();
+    }
+}
+
 /// The scenario asked for.
 fn scenario(args: &SimulateArgs) -> Result<Scenario, SimulateError> {
     let mut scenario = match (&args.plan, args.building) {
@@ -116,7 +146,7 @@ fn scenario(args: &SimulateArgs) -> Result<Scenario, SimulateError> {
         scenario.odom_rate_hz = SWEPT_ODOM_RATE_HZ;
     }
     for laser in &mut scenario.lasers {
-        laser.mount.upside_down = args.upside_down;
+        fit(laser, args);
     }
     if args.wheels == WheelsKind::Rough {
         scenario.wheels = Wheels::rough();
@@ -146,6 +176,7 @@ mod tests {
     use super::super::storey::tests::{ROW, TWO_ROOMS};
     use super::*;
     use clap::Parser;
+    use std::f64::consts::PI;
 
     #[derive(Parser)]
     struct Cli {
@@ -169,12 +200,25 @@ mod tests {
 
     #[test]
     fn the_last_word_names_the_log_to_map() {
-        for (options, log) in
-            [("", "sim.clf"), ("--lidar rplidar --wheels rough", "sim.rec"), ("--upside-down", "sim.rec")]
-        {
+        for (options, log) in [
+            ("", "sim.clf"),
+            ("--lidar rplidar --wheels rough", "sim.rec"),
+            ("--upside-down", "sim.rec"),
+            ("--yaw -90", "sim.rec"),
+        ] {
             let said = ran("last", ROW, options).unwrap();
             assert!(said.contains(&format!("{log}: ")), "{options}: {said}");
         }
+    }
+
+    #[test]
+    fn a_laser_is_as_asked_for() {
+        let args = ["simulate", "out", "--fov", "270", "--beams", "90", "--reach", "8", "--yaw", "-90"];
+        let scenario = scenario(&Cli::try_parse_from(args).unwrap().simulate).unwrap();
+        let laser = &scenario.lasers[0];
+        assert_eq!((laser.beams, laser.mount.range_max_m), ((90, 90), 8.0));
+        assert!((laser.fov_rad - 1.5 * PI).abs() < 1e-12 && (laser.mount.yaw_rad + 0.5 * PI).abs() < 1e-12);
+        assert!(Cli::try_parse_from(["simulate", "out", "--beams", "1"]).is_err());
     }
 
     #[test]
