@@ -139,7 +139,7 @@ pub(crate) fn gained(before: &[Evidence], after: &[Evidence]) -> Vec<Vertex> {
     let was = |e: &Evidence| {
         before.iter().filter(|b| (b.place, b.label) == (e.place, e.label)).map(|b| b.weight).sum::<f64>()
     };
-    after.iter().filter(|e| e.weight - was(e) > NAMED_MIN).map(|e| e.place).collect()
+    after.iter().filter(|e| e.weight > NAMED_MIN && e.weight - was(e) > NAMED_MIN).map(|e| e.place).collect()
 }
 
 #[cfg(test)]
