@@ -41,12 +41,13 @@ impl Filter {
 
     /// The same by the sentence's number in the ledger. Returns how many loops were given up with it.
     pub(crate) fn strike(&mut self, number: u32) -> usize {
+        let led = self.led_by_names();
         Arc::make_mut(&mut self.ledger).strike(number);
         for p in &mut self.particles {
             p.revoke(number);
         }
         self.resolve();
-        let given_up = self.judge_again();
+        let given_up = self.judge_again(led);
         self.rank();
         given_up
     }

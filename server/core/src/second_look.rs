@@ -69,16 +69,20 @@ impl Filter {
         self.particles.iter().any(|p| p.edges.iter().any(|e| (e.i, e.j) == pair))
     }
 
-    /// Judges again the revisits that names led to which were taken back: who would not have taken the
-    /// edge for the distance alone gives up all edges of the revisit. Returns how many revisits some
-    /// particle gave up. Weights stay: what the scans said they still say.
-    pub(crate) fn judge_again(&mut self) -> usize {
-        let unnamed =
-            |p: &Particle, pair: &(Vertex, Vertex)| p.labels.similarity(pair.0, pair.1) < SIMILARITY_MIN;
-        let revisits = |p: &Particle| -> BTreeSet<(Vertex, Vertex)> {
-            p.edges.iter().filter_map(|e| e.named).filter(|pair| unnamed(p, pair)).collect()
+    /// Pairs whose names led to revisits, and still would.
+    pub(crate) fn led_by_names(&self) -> BTreeSet<(Vertex, Vertex)> {
+        let of = |p: &Particle| -> BTreeSet<(Vertex, Vertex)> {
+            p.edges.iter().filter_map(|e| e.named).filter(|&pair| !unnamed(p, pair)).collect()
         };
-        let doubted: BTreeSet<(Vertex, Vertex)> = self.particles.iter().flat_map(revisits).collect();
+        self.particles.iter().flat_map(of).collect()
+    }
+
+    /// Judges again the revisits, of those that names led to, whose names were taken back: who would not
+    /// have taken the edge for the distance alone gives up all edges of the revisit. Returns how many
+    /// revisits some particle gave up. Weights stay: what the scans said they still say.
+    pub(crate) fn judge_again(&mut self, led: BTreeSet<(Vertex, Vertex)>) -> usize {
+        let doubt = |pair: &(Vertex, Vertex)| self.particles.iter().any(|p| unnamed(p, *pair));
+        let doubted: Vec<(Vertex, Vertex)> = led.into_iter().filter(doubt).collect();
         let mut given_up = 0;
         for pair in doubted {
             let kind = EdgeKind::Distance;
@@ -87,7 +91,7 @@ impl Filter {
                     .fits;
             let (structure, gamma_per_m2) = (&self.structure, self.config.gamma_per_m2);
             let again = |p: &Particle| {
-                if unnamed(p, &pair) { without(p, structure, pair, &fits, gamma_per_m2) } else { None }
+                if unnamed(p, pair) { without(p, structure, pair, &fits, gamma_per_m2) } else { None }
             };
             let again: Vec<Option<Particle>> = self.particles.par_iter().map(again).collect();
             given_up += usize::from(again.iter().any(Option::is_some));
@@ -113,6 +117,11 @@ fn wait(waiting: &mut VecDeque<Vertex>, places: impl Iterator<Item = Vertex>) {
         }
     }
     waiting.drain(..waiting.len().saturating_sub(WAITING_MAX));
+}
+
+/// Whether the names of a pair would not propose an edge.
+fn unnamed(p: &Particle, (i, j): (Vertex, Vertex)) -> bool {
+    p.labels.similarity(i, j) < SIMILARITY_MIN
 }
 
 /// The particle without the edges of a revisit, if it would not take it by the distance alone.
