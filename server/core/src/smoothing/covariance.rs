@@ -17,7 +17,7 @@ use super::structure::Structure;
 use super::tree::{Clique, NONE};
 use super::{Belief, SmoothError};
 use crate::geometry::Pose2;
-use nalgebra::Matrix3;
+use nalgebra::{Dyn, Matrix3, MatrixView, MatrixXx3, U1, U3};
 use std::hint::black_box;
 use std::rc::Rc;
 
@@ -62,8 +62,10 @@ pub struct Relative {
     pub covariance: Matrix3<f64>,
 }
 
-/// Y of one pose: by clique from the pose's own to the root, the frontals' blocks.
-type Column = Vec<(u32, Vec<Matrix3<f64>>)>;
+/// Y of one pose: by clique from the pose's own to the root, the frontals' rows.
+type Column = Vec<(u32, MatrixXx3<f64>)>;
+/// One clique's.
+type Rows<'a> = MatrixView<'a, f64, Dyn, U3, U1, Dyn>;
 
 impl Belief {
     /// Σ_ii in the frame of i: m², m·rad, rad². Zero for the first pose; infinite while updates fail.
@@ -73,7 +75,7 @@ impl Belief {
             return Matrix3::from_diagonal_element(f64::INFINITY);
         }
         let mut sum = Matrix3::zeros();
-        self.climb(structure, i, |_, y| sum += gram(y));
+        self.climb(structure, i, |_, y| sum += y.tr_mul(&y));
         symmetrised(&sum)
     }
 
@@ -89,15 +91,15 @@ impl Belief {
             self.check(structure, j)?;
             let (mut marginal, mut cross) = (Matrix3::zeros(), Matrix3::zeros());
             self.climb(structure, j, |c, y| {
-                marginal += gram(y);
+                marginal += y.tr_mul(&y);
                 if let Some((_, of_newest)) = of_newest.iter().find(|(at, _)| *at == c) {
-                    cross += product(of_newest, y);
+                    cross += of_newest.tr_mul(&y);
                 }
             });
             Ok(JointPart { j, marginal: symmetrised(&marginal), cross })
         };
         let others = candidates.iter().map(part).collect::<Result<_, _>>()?;
-        let marginal = of_newest.iter().map(|(_, y)| gram(y)).sum::<Matrix3<f64>>();
+        let marginal = of_newest.iter().map(|(_, y)| y.tr_mul(y)).sum::<Matrix3<f64>>();
         Ok(Joint { newest, marginal: symmetrised(&marginal), others })
     }
 
@@ -119,14 +121,13 @@ impl Belief {
             self.climb(structure, i, |c, y| match of_a.iter().position(|(at, _)| *at == c) {
                 Some(at) if i != a => {
                     met = met.min(at);
-                    let apart: Vec<_> =
-                        of_a[at].1.iter().zip(y).map(|(a, i)| a - i * t.transpose()).collect();
-                    common += gram(&apart);
+                    let apart = &of_a[at].1 - y * t.transpose();
+                    common += apart.tr_mul(&apart);
                 }
                 Some(at) => met = met.min(at),
-                None => own += gram(y),
+                None => own += y.tr_mul(&y),
             });
-            let of_a_alone: Matrix3<f64> = of_a[..met].iter().map(|(_, y)| gram(y)).sum();
+            let of_a_alone: Matrix3<f64> = of_a[..met].iter().map(|(_, y)| y.tr_mul(y)).sum();
             Ok(Relative {
                 i,
                 i_from_a: self.pose(i).between(&self.pose(a)),
@@ -216,54 +217,36 @@ impl Belief {
 
     fn column(&self, structure: &Structure, a: u32) -> Column {
         let mut column = Column::new();
-        self.climb(structure, a, |c, y| column.push((c, y.to_vec())));
+        self.climb(structure, a, |c, y| column.push((c, y.into_owned())));
         column
     }
 
     /// Solves `L Y = E_i` from the pose's clique to the root.
-    fn climb(&self, structure: &Structure, i: u32, mut visit: impl FnMut(u32, &[Matrix3<f64>])) {
+    fn climb(&self, structure: &Structure, i: u32, mut visit: impl FnMut(u32, Rows)) {
         let cliques = &structure.tree.cliques;
         let mut c = structure.tree.clique_of[i as usize];
-        let (mut b, mut above, mut y) = (Vec::new(), Vec::new(), Vec::new());
-        if c != NONE {
-            let clique = &cliques[c as usize];
-            let n = 3 * clique.poses.len();
-            b.resize(3 * n, 0.0);
-            if let Some(at) = clique.poses.iter().position(|&p| p == i) {
-                (0..3).for_each(|k| b[k * n + 3 * at + k] = 1.0);
-            }
+        let Some(clique) = cliques.get(c as usize) else { return };
+        // The right-hand side over a clique's coordinates, three columns, and that over its parent's.
+        let (mut b, mut above) = (vec![0.0; 9 * clique.poses.len()], Vec::new());
+        if let Some(at) = clique.poses.iter().position(|&p| p == i) {
+            (0..3).for_each(|k| b[3 * clique.poses.len() * k + 3 * at + k] = 1.0);
         }
-        while c != NONE {
-            let clique = &cliques[c as usize];
+        while let Some(clique) = cliques.get(c as usize) {
             let Some(front) = &self.fronts[c as usize] else { return };
             front.solve_forward(&mut b);
-            let n = 3 * clique.poses.len();
-            y.clear();
-            y.extend((0..clique.frontals).map(|k| Matrix3::from_fn(|r, c| b[c * n + 3 * k + r])));
-            visit(c, &y);
+            let (n, rows) = (3 * clique.poses.len(), 3 * clique.frontals);
+            visit(c, Rows::from_slice_with_strides_generic(&b, Dyn(rows), U3, U1, Dyn(n)));
             c = clique.parent;
-            if c != NONE {
-                let into = 3 * cliques[c as usize].poses.len();
-                above.clear();
-                above.resize(3 * into, 0.0);
-                for (k, &slot) in (clique.frontals..).zip(&clique.slots) {
-                    for c in 0..3 {
-                        let from = &b[c * n + 3 * k..][..3];
-                        above[c * into + 3 * slot as usize..][..3].copy_from_slice(from);
-                    }
+            let Some(parent) = cliques.get(c as usize) else { return };
+            let into = 3 * parent.poses.len();
+            above.clear();
+            above.resize(3 * into, 0.0);
+            for (from, into) in b.chunks_exact(n).zip(above.chunks_exact_mut(into)) {
+                for (from, &slot) in from[rows..].chunks_exact(3).zip(&clique.slots) {
+                    into[3 * slot as usize..][..3].copy_from_slice(from);
                 }
-                std::mem::swap(&mut b, &mut above);
             }
+            std::mem::swap(&mut b, &mut above);
         }
     }
-}
-
-/// `YᵀY`.
-fn gram(y: &[Matrix3<f64>]) -> Matrix3<f64> {
-    product(y, y)
-}
-
-/// `AᵀB`.
-fn product(a: &[Matrix3<f64>], b: &[Matrix3<f64>]) -> Matrix3<f64> {
-    a.iter().zip(b).map(|(a, b)| a.tr_mul(b)).sum()
 }
