@@ -17,12 +17,25 @@ const IDIOMS: &str = "in the dumps|the point of no return|over the moon|under th
     in seventh heaven|in the clear|in the red|in the black|on the rocks|up to here|down the tubes|\
     on the table|off the table|in the gutter|in the toilet|down the toilet|through the wringer";
 /// Verbs that order something.
-const ORDERS: [&str; 60] = [
-    "angle", "be", "bring", "call", "charge", "check", "clean", "close", "come", "continue", "cross",
-    "drive", "empty", "enter", "exit", "face", "fetch", "fill", "find", "fix", "follow", "forget", "get",
-    "give", "go", "grab", "head", "help", "hold", "keep", "leave", "let", "listen", "look", "make", "move",
-    "open", "pass", "pick", "play", "press", "put", "remember", "remind", "repeat", "save", "say", "set",
-    "show", "shut", "start", "stop", "switch", "take", "tell", "turn", "wait", "walk", "wash", "watch",
+const ORDERS: [&str; 188] = [
+    "add", "adjust", "angle", "answer", "approach", "assemble", "assist", "attach", "back", "be",
+    "book", "boot", "brew", "bring", "build", "buy", "call", "cancel", "carry", "change", "charge",
+    "check", "circle", "clean", "climb", "close", "collect", "come", "connect", "contact", "continue",
+    "cook", "copy", "count", "cross", "cut", "deliver", "describe", "dim", "disable", "disconnect",
+    "dock", "drive", "drop", "dry", "dust", "empty", "enable", "ensure", "enter", "erase", "exit",
+    "explain", "explore", "face", "feed", "fetch", "fill", "find", "fix", "fold", "follow", "forget",
+    "get", "give", "go", "grab", "guard", "guide", "hand", "hang", "head", "heat", "help", "hide",
+    "hold", "hurry", "ignore", "increase", "inform", "inspect", "join", "keep", "knock", "lead",
+    "learn", "leave", "let", "lift", "light", "listen", "load", "lock", "look", "lower", "make", "map",
+    "mark", "measure", "mop", "move", "mute", "notify", "observe", "open", "order", "pack", "park",
+    "pass", "pause", "photograph", "pick", "play", "plug", "position", "pour", "prepare", "press",
+    "print", "pull", "push", "put", "raise", "reach", "read", "reboot", "record", "reduce", "refill",
+    "release", "remember", "remind", "remove", "repair", "repeat", "replace", "report", "reset",
+    "restart", "return", "ring", "rotate", "run", "save", "say", "scan", "search", "send", "serve",
+    "set", "show", "shut", "sit", "slow", "speak", "spin", "start", "stay", "stop", "store",
+    "straighten", "sweep", "switch", "take", "tell", "throw", "tidy", "touch", "translate", "try",
+    "turn", "type", "undock", "unload", "unlock", "unplug", "use", "vacuum", "visit", "wait", "wake",
+    "walk", "warm", "wash", "watch", "water", "wipe", "write",
 ];
 
 /// Why a sentence is set aside, if it has the words of a figure of speech.
@@ -34,6 +47,9 @@ pub(super) fn idiom(words: &[Word]) -> Option<Reason> {
 /// Why a sentence that is not understood is set aside, if it is an order.
 pub(super) fn order(words: &[Word]) -> Option<Reason> {
     let mut at = Cursor::new(words);
+    if at.eat("please") {
+        return Some(Reason::Command);
+    }
     at.skip(
         "please|robot|can you|could you|would you|hey|ok|okay|,|now|then|do not|will you|you should|just",
     );

@@ -123,7 +123,13 @@ fn ask_what(at: &mut Cursor) -> Option<Content> {
 
 /// "Why do you think the kitchen is over there?"
 fn ask_why(at: &mut Cursor) -> Option<Content> {
-    at.eat("why").then_some(())?;
+    if at.eat_each(&["what", "makes|made", "you", "think|believe|say|so sure", "that|"])
+        || at.eat_each(&["how", "do|did|can|could", "you", "know|tell|be sure", "that|"])
+    {
+        let said = statement(at)?;
+        return Some(Content::Ask { kind: Question::Why, about: About::Content(Box::new(said)) });
+    }
+    at.eat_any("why|how come")?;
     if at.eat_any("do you think that|do you think|did you think that|did you think|do you believe|do you say|did you say|do you say that|would you think|are you sure").is_some() {
         let said = statement(at)?;
         return Some(Content::Ask { kind: Question::Why, about: About::Content(Box::new(said)) });

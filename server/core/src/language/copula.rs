@@ -5,8 +5,8 @@ use super::cursor::Cursor;
 
 /// How sure words of doubt are: what people take them to mean in surveys of verbal probabilities (after
 /// Kent, "Words of Estimative Probability", 1964: probable 0.75, chances about even 0.5).
-const LIKELY: f64 = 0.75;
-const EVEN: f64 = 0.5;
+pub(super) const LIKELY: f64 = 0.75;
+pub(super) const EVEN: f64 = 0.5;
 
 /// "Is probably not".
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -23,6 +23,7 @@ impl Cursor<'_> {
         }
         self.eat_any("on|to|at")?;
         let whose = self.eat_any("the|your|my|our|its")?;
+        self.skip("immediate|very|far|near");
         let left = self.eat_any("left|right")? == "left";
         self.skip("hand|side");
         let (of, along) = if left { (R::LeftOf, R::LeftSide) } else { (R::RightOf, R::RightSide) };
@@ -106,7 +107,7 @@ impl Cursor<'_> {
             return Some(Related::to(R::AwayFrom, here()));
         }
         if !self.sees("there is|there are|there will|there should")
-            && self.eat_any("over there|there").is_some()
+            && self.eat_any("over there|there|that way|over that way|down that way|back that way").is_some()
         {
             return Some(Related::to(R::At, Phrase::new(Head::There)));
         }

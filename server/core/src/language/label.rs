@@ -41,9 +41,14 @@ fn welcome(at: &mut Cursor) -> Option<Readings> {
 
 /// "They call this place the Z-center", "we call it the fishbowl".
 fn people_call(at: &mut Cursor) -> Option<Readings> {
-    at.eat_any("we|they|people|everyone|everybody|the students|students|i|most people|some people|you can")?;
-    at.skip("all|also|usually|just|like to|always|sometimes|often|normally");
-    at.eat_any("call|calls|refer to")?;
+    let named_group = at.eat_any("the students|the staff|the faculty|the locals|the grad students|the undergrads|\
+        some people|most people|some of us|most of us|lots of people|a lot of people|many people|folks around here|\
+        people around here|people here|everyone here|everybody here|folks here");
+    if named_group.is_none() {
+        at.eat_any("we|they|people|everyone|everybody|students|folks|i|you can|you")?;
+    }
+    at.skip("all|also|usually|just|like to|always|sometimes|often|normally|would|could|tend to|generally");
+    at.eat_any("call|calls|refer to|refers to|know")?;
     let spot = at.eat_any(SPOT).is_some();
     if spot || at.eat_any("this|these").is_some() {
         at.eat("as");
@@ -64,23 +69,37 @@ fn people_call(at: &mut Cursor) -> Option<Readings> {
 
 /// "Here we have the kitchen", "we have reached the lobby".
 fn presented_here(at: &mut Cursor) -> Option<Readings> {
-    at.eat_any(
-        "over here we have|here we have|here you have|here you can see|here you see|here you will find|over here is|\
-         we have reached|we have now reached|we have entered|we have just entered|we just entered|we are entering|\
-         we are now entering|you are entering|you are now entering|we just reached|we have just reached|\
-         we just walked into|we have come to|we have arrived at|we have arrived in|you have reached|\
-         you have just entered|we have made it to|we are now coming into|we are coming into|\
-         what you see here is|what you are looking at is|what we have here is",
-    )?;
-    let phrase = named(at).filter(plausible)?;
+    let named_so = at.eat_each(&["the", "name of|name for", SPOT_OR_IT, "is|would be"]);
+    let shown = named_so
+        || at.eat_each(&["over here|right here|here", "we|you", "have|can see|see|will find|will see|find"])
+        || at.eat_each(&["over here", "is"])
+        || at.eat_each(&["we|you", "have|are|just", SO_FAR, SO_FAR, ARRIVED])
+        || at.eat_each(&["we|you|i", "are", SO_FAR, "looking at|seeing|facing here", "here|"])
+        || at.eat_each(&["what", "we|you|i", "are looking at|are seeing|are standing in|are in|see|have", "here|", "is"]);
+    let phrase = shown.then(|| named(at))?.filter(|p| named_so || plausible(p))?;
     Some(called(at, Head::Here, phrase, false))
 }
 
+/// What leaves a place behind one.
+pub(super) const LEFT_BEHIND: &str = "passed by|passed through|passed|left behind|left|come from|come out of|come through|\
+    came from|came out of|came through|walked past|walked by|walked through|walked out of|went past|went by|\
+    went through|gone past|gone by|gone through|exited|visited|saw|seen|in|at";
+/// Adverbs between "we have" and what was done.
+const SO_FAR: &str = "now|just|finally|already|all|at last|also|currently|";
+/// What brings one into a place.
+const ARRIVED: &str = "reached|entered|come to|come into|arrived at|arrived in|walked into|stepped into|made it to|\
+    got to|gotten to|reaching|entering|coming into|walking into|stepping into|arriving at|arriving in|\
+    passing through|walking through|moving through|walking down|walking along|crossing";
+/// "This place", "it", as what has a name.
+const SPOT_OR_IT: &str = "this place|this room|this area|this space|this spot|this building|this location|this one|this";
+
 /// "We have returned to the lobby".
 fn returned(at: &mut Cursor) -> Option<Readings> {
+    at.eat_each(&["we|you", "have|are|", SO_FAR]).then_some(())?;
     at.eat_any(
-        "we have returned to|we returned to|we have made it back to|we have got back to|we are returning to|\
-         we came back to|you have returned to|we have gone back to|we went back to|we have circled back to",
+        "returned to|made it back to|got back to|gotten back to|returning to|came back to|come back to|gone back to|\
+         went back to|circled back to|looped back to|ended up back at|ended up back in|wound up back at|wound up back in|\
+         come full circle to|come full circle back to|ended up at|ended up in",
     )?;
     if let Some(like) = at.pointer() {
         let start = like.head == Head::Start;
@@ -92,12 +111,8 @@ fn returned(at: &mut Cursor) -> Option<Readings> {
 
 /// "We just passed the library".
 fn passed(at: &mut Cursor) -> Option<Readings> {
-    at.eat_any(
-        "we have just passed|we just passed|we have just left|we just left|we just came from|we just came out of|\
-         we have just come from|we have just come out of|you just passed|you have just passed|we were just in|\
-         we just walked past|we just walked out of|we just exited",
-    )?;
-    let phrase = named(at).filter(plausible)?;
+    let just = at.eat_each(&["we|you|i", "have just|just|were just", LEFT_BEHIND]);
+    let phrase = just.then(|| named(at))?.filter(plausible)?;
     Some(called(at, Head::Previous, phrase, false))
 }
 

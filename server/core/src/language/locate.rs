@@ -4,7 +4,7 @@
 use super::act::{Content, Head, Locate, Owner, Phrase, Sameness};
 use super::attach::{Chain, Weighed};
 use super::build::{Readings, label, locate_all, negate, one, shaped};
-use super::copula::Copula;
+use super::copula::{Copula, EVEN, LIKELY};
 use super::cursor::Cursor;
 use super::describe::attribute;
 use super::label::{named, plausible};
@@ -17,11 +17,28 @@ use super::repair::{guessed, mended};
 
 /// Figures of one clause ("the kitchen and the lounge are …").
 const MAX_FIGURES: usize = 4;
-/// Shows something that the listener need not know.
-const PRESENT: &str = "there is also|there are also|there is|there are|there will be|there should be|there used to be|\
-    we also have|we have got|we have|you have got|you have|you will find|you can find|you find|you will see|you can see|\
-    you see|we find|you will come to|you will be able to see|you should see|you should find|we will find|we will see|\
-    you can get to|you get to|you can reach|you reach|we will pass|we pass|you pass|you will also find|you can also find|you will also see|you will pass|we have also got";
+/// Shows something that the listener need not know: how sure it is, and whether it is no longer there.
+fn presents(at: &mut Cursor) -> Option<(f64, bool)> {
+    let also = "also|actually|always|only|";
+    if at.eat_each(&["there", "used to be"]) {
+        return Some((1.0, true));
+    }
+    if at.eat_each(&["there", also, "might|may|could", "also|", "be"]) {
+        return Some((EVEN, false));
+    }
+    if at.eat_each(&["there", also, "must|ought to|should|seems to|appears to", "also|", "be"]) {
+        return Some((LIKELY, false));
+    }
+    let there = at.eat_each(&["there", also, "is|are|will be|happens to be|happen to be"])
+        || at.eat_each(&["we|you|they", also, "have got|have|keep|store", "got|"])
+        || at.eat_each(&["we|you|they|one", also, "will|can|should|would|may|", also, "be able to|", FINDING])
+        || at.eat_each(&["we|you", "are", "now|just|", "passing|coming up on|coming up to|approaching|going past|going by|walking past"]);
+    there.then_some((1.0, false))
+}
+
+/// How "you" come upon a place.
+const FINDING: &str = "find|see|notice|spot|come to|come across|come upon|run into|encounter|hit|get to|reach|pass by|pass|\
+    have";
 
 /// Reads a clause that locates something.
 pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
@@ -38,35 +55,45 @@ pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
 /// "If you are looking for the library, it's down the hall".
 fn wanted(at: &mut Cursor) -> Option<Readings> {
     at.eat_any(
-        "if you are looking for|if you need|if you want|if you are going to|if you have to go to|for",
+        "if you are looking for|if you need to find|if you need to get to|if you need to go to|if you ever need|\
+         if you need|if you want to find|if you want to get to|if you want to go to|if you want|if you are going to|\
+         if you have to go to|if you are trying to find|if you are trying to get to|as for|for",
     )?;
     let figures = figures(at, true)?;
     at.skip(",|then");
-    at.eat_any("it is|they are|that is|you can find it|you will find it|you can find them")?;
+    at.eat_any("it is|they are|that is|that would be|that will be|you can find it|you will find it|you can find them|\
+        you will find them|you can find one|you will find one|there is one|there are some|there are a few|\
+        there is a pair|there are several|we have one|we keep them|we keep it|go|look|try")?;
     located(&figures, &at.chain(false))
 }
 
 /// "There is a lab next to the gym", "you can find the copier in the mail room".
 fn presented(at: &mut Cursor) -> Option<Readings> {
-    let verb = at.eat_any(PRESENT)?;
-    at.skip("actually|also|probably|even|only|just");
+    let (certainty, former) = presents(at)?;
+    at.skip("actually|also|even|only|just|all|our|the rest of");
+    let doubt = at.eat_any("probably|most likely|maybe|perhaps|likely").is_some();
     let none = at.eat_any("no|not a|not any|no other").is_some();
     let figures = figures(at, true)?;
     let here = at.eat_any("right here|in here|here|in this room").is_some() && at.at_break();
     let chain = if here { Chain::here() } else { at.chain(false) };
     // "You have a kitchen" says nothing; "there is a room" neither.
     let readings = located(&figures, &chain)?;
-    let denies = none ^ (verb == "there used to be");
-    Some(if denies { readings.map(negate) } else { readings })
+    let certainty = readings.certainty * certainty * if doubt { LIKELY } else { 1.0 };
+    let readings = Readings { certainty, ..readings };
+    Some(if none ^ former { readings.map(negate) } else { readings })
 }
 
 /// "Just past the entrance is the reception desk".
 fn inverted(at: &mut Cursor) -> Option<Readings> {
-    at.skip("here|over here|up here|down here|coming up|next up");
+    at.skip("here|over here|up here|down here|coming up|next up|if you look|when you look|look|looking");
     let chain = at.leading_chain();
     chain.first()?;
-    at.skip(",");
-    let verb = if at.eat_any(PRESENT).is_some() { None } else { Some(at.copula()?) };
+    let comma = at.eat(",");
+    if comma {
+        // "On your right, that's the lab".
+        at.eat_any("that|it|this").filter(|_| at.sees("is"));
+    }
+    let verb = if presents(at).is_some() { None } else { Some(at.copula()?) };
     let figures = figures(at, true)?;
     let readings = located(&figures, &chain)?;
     Some(match verb {
@@ -91,7 +118,12 @@ fn said_of_places(at: &mut Cursor) -> Option<Readings> {
         return belongs(at, subject, readings);
     }
     *at = start;
-    let verb = at.copula()?;
+    // "The gym you'll find next to the lab"; "the gym, it's down the hall".
+    let found = at.eat_each(&["you", "will|can", "find|see|reach"]);
+    if at.before() == "," {
+        at.eat_any("it|they|that").filter(|_| at.sees("is|are"));
+    }
+    let verb = if found { super::copula::PLAIN } else { at.copula()? };
     if verb.quantity.is_some() {
         return None;
     }
@@ -106,6 +138,8 @@ fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> 
     at.skip("both");
     loop {
         let mut subject = at.noun_phrase()?;
+        at.eat_each(&["that|which|", "we|you|i", "are looking for|are after|want|need|asked about|asked for|mentioned|\
+            are going to|were asking about|told you about|are heading to|are heading for"]);
         let relative = at.eat_any(", which is|, which are|, located|, situated").is_some();
         let chain = at.chain(true);
         if relative && (chain.is_empty() || at.at_end()) {
@@ -278,17 +312,31 @@ fn belongs(at: &mut Cursor, subject: &NounPhrase, readings: &Weighed<Phrase>) ->
 fn leads(at: &mut Cursor, subject: &NounPhrase) -> Option<Readings> {
     let definite = matches!(subject.determiner, Determiner::Definite | Determiner::Demonstrative);
     let way = matches!(subject.kind, Kind::Place | Kind::Vague) && definite;
-    at.skip("also|then");
-    let relation = match at.eat_any(
-        "leads back to|leads into|leads to|leads down to|leads up to|lead to|goes to|goes into|takes you to|\
-         brings you to|opens into|opens onto|opens to|runs past|goes past|leads past|runs along",
-    )? {
-        "runs past" | "goes past" | "leads past" => R::Past,
-        "runs along" => R::Along,
-        _ => R::To,
-    };
+    at.skip("also|then|here|directly|just|right");
+    let relation = lead(at)?;
     let (landmark, sure) = at.landmark()?;
     (way && sure).then(|| one(super::build::locate(&subject.phrase, &Related::to(relation, landmark))))
+}
+
+/// "Leads to", "takes you back into", "faces": how what the subject is lies to what follows.
+fn lead(at: &mut Cursor) -> Option<R> {
+    at.eat_any("will|would|can");
+    let goes = "leads|lead|goes|go|takes|take|brings|bring|runs|run|opens out|opens|open|connects|connect|gets|get|continues";
+    let way = "up|down|out|back|straight|right|directly|over|all the way|";
+    if at.eat_each(&[goes, "you|us|one|people|", way, way, "to|into|onto"]) {
+        return Some(R::To);
+    }
+    if at.eat_each(&["goes|go|runs|run|leads|lead|takes you", way, "past|by"]) {
+        return Some(R::Past);
+    }
+    if at.eat_each(&["goes|go|runs|run", "along|alongside"]) {
+        return Some(R::Along);
+    }
+    if at.eat_any("adjoins|adjoin|borders|abuts").is_some() {
+        return Some(R::NextTo);
+    }
+    at.eat_any("faces|face|looks onto|is facing")?;
+    Some(R::AcrossFrom)
 }
 
 pub(super) fn is_door(phrase: &Phrase) -> bool {

@@ -244,7 +244,7 @@ pub(super) const FUNCTION_WORDS: &[&str] = &[
     "believe", "belong", "belongs", "below", "beneath", "beside", "besides", "between", "beyond",
     "both", "brings", "but", "by", "bye", "call", "called", "came", "can", "cannot", "come",
     "comes", "connects", "contain", "containing", "contains", "could", "did", "do", "does", "doing",
-    "done", "down", "downstairs", "during", "each", "either", "else", "ends", "enter", "ever",
+    "done", "down", "downstairs", "during", "each", "earlier", "either", "else", "ends", "enter", "ever",
     "every", "everybody", "everyone", "everywhere", "except", "exits", "facing", "farther", "feel",
     "felt", "few", "find", "folks", "for", "forget", "forks", "from", "further", "get", "gets",
     "getting", "go", "goes", "going", "gone", "got", "guess", "guys", "had", "has", "have",
