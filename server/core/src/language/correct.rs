@@ -4,6 +4,7 @@ use super::act::{Act, Content, Head, Locate, Phrase, Sameness};
 use super::build::{Readings, label, locate_all, negate, one};
 use super::cursor::Cursor;
 use super::label::{named, plausible};
+use super::lexicon::is_function_word;
 use super::locate::{located, renamed};
 
 /// Said before a clause: what was said before was wrong.
@@ -19,6 +20,10 @@ const MENDS: &str = "no wait|no , wait|wait , no|wait no|i mean|i meant to say|i
 /// Steps over words that take something back; false if there are none.
 pub(super) fn eat_mark(at: &mut Cursor) -> bool {
     if at.sees("no longer|no one|sorry to|actually ,") && at.peek(1) != "," {
+        return false;
+    }
+    // "No office has a sink" denies of all.
+    if at.peek(0) == "no" && !is_function_word(at.peek(1)) && !matches!(at.peek(1), "" | "," | "wait" | "sorry") {
         return false;
     }
     at.eat_any(MARKS).is_some()
@@ -44,11 +49,14 @@ pub(super) fn renaming(at: &mut Cursor) -> Option<Readings> {
     }
     *at = start;
     at.eat_any(
-        "i called this place|i called this|i said this is|i said this was|i said that this was|i told you this was|i said we were in|i thought this was")?;
+        "i called this place|i called this room|i called this|i said this is|i said this was|i said this place was|\
+         i said this room was|i said that this was|i said it was|i told you this was|i told you that this was|\
+         i said we were in|i said we were at|i thought this was|i thought we were in|i thought it was")?;
     let was = named(at)?;
-    at.skip(",");
-    at.eat_any("but|and")?;
-    at.eat_any("it is|this is|we are in|that is")?;
+    at.skip(",|earlier|before|just now|a minute ago|a moment ago");
+    at.eat_any("but actually|but|and|yet|although|though")?;
+    at.skip("actually|really|in fact");
+    at.eat_any("it is|this is|we are in|that is|it was")?;
     at.skip("actually|really|in fact");
     let is = named(at).filter(plausible)?;
     let said = |what: Phrase| Box::new(label(Head::Here, what, Sameness::Open));
@@ -122,7 +130,7 @@ pub(super) fn mend(at: &mut Cursor, last: &Content) -> Option<Readings> {
         return instead(at, last).map(|readings| readings.map(negate));
     }
     if let Content::Negate(denied) = last {
-        at.skip("but|rather|instead|no|it is|this is|that is|,");
+        at.skip("but|rather|instead|no|it is|this is|that is|it was|that was|,");
         return instead(at, denied);
     }
     at.eat_any(MENDS)?;

@@ -2,6 +2,7 @@
 
 use super::act::{Content, Head, Phrase, Sameness};
 use super::build::{Readings, label, locate_all, negate, one};
+use super::copula::{EVEN, LIKELY};
 use super::cursor::Cursor;
 use super::names::Kind;
 use super::noun_phrase::{Determiner, NounPhrase};
@@ -11,10 +12,19 @@ use super::pointed::{pointed, related_predicate, same_place};
 pub(super) const SPOT: &str = "this place here|this over here|this one over here|this place|this room here|this room|this area|this space|this spot|this building|\
     this location|this one here|this one";
 /// "As before": the place so called is one seen before.
-const AS_BEFORE: &str = "as before|as earlier|as last time|from before|from earlier|we saw before|we saw earlier|\
-    we were in before|we were in earlier|that we saw before|that we were in before|we have seen before|as we saw before|\
-    we visited before|we visited earlier|where we were before|where we were earlier|we passed before|we passed earlier|\
-    we came through before|we were at before|again|once again|once more";
+const AS_BEFORE: &str = "as before|as earlier|as last time|from before|from earlier|where we were before|\
+    where we were earlier|from last time|again|once again|once more|as the last time|as the one before";
+
+/// "As before", "that we walked down earlier".
+fn as_before(at: &mut Cursor) -> bool {
+    let did = "saw|see|seen|were in|were at|in|been in|been at|been to|visited|passed by|passed|passed through|came through|\
+        came down|came by|walked through|walked down|walked past|walked along|went through|went down|went past|looked at|\
+        stopped at|stopped in|were|went to|came across";
+    let when = "before|earlier|already|last time|a minute ago|a moment ago|a while ago|just now|previously|at first|a while back|\
+        a few minutes ago";
+    at.eat_any(AS_BEFORE).is_some()
+        || at.eat_each(&["that|which|as|where|", "we|you|i", "have|had|", "just|already|", did, when])
+}
 /// Says nothing of where the place is (a map is one level).
 const ON_FLOOR: &str = "of the building|of this building|in this building|in the building|to the building|to this building|\
     on this floor|on our floor|on the ground floor|on the first floor|on the second floor|on the third floor|\
@@ -118,31 +128,27 @@ fn passed(at: &mut Cursor) -> Option<Readings> {
 
 /// "We are back in the gym", "we are next to the gym", "we have been here before".
 fn we_are(at: &mut Cursor) -> Option<Readings> {
-    if at.eat_any("we have been here before|we have been here already|we have already been here|we were here before|\
-        we were here earlier|we were here already|we were already here|i have been here before|you have been here before|\
-        we have seen this place before|we have seen this before|we have seen this room before|we have been in this room before|\
-        we have been in here before|we have visited this place before")
-        .is_some()
-    {
-        return Some(one(been_here(true)));
+    if let Some(same) = been(at) {
+        return Some(one(been_here(same)));
     }
-    if at.eat_any("we have not been here before|we have never been here before|we have never been here|\
-        we have not been here yet|we have not been here|we were not here before|this is a new place|this is somewhere new|\
-        you have not been here before|you have never been here before|you have never been here")
-        .is_some()
-    {
+    if at.eat_any("this is a new place|this is somewhere new").is_some() {
         return Some(one(been_here(false)));
     }
+    let doubtful = at.eat_each(&["we|you", "might|may|could", "now|", "be"]).then_some(EVEN).or_else(|| {
+        let likely = at.eat_each(&["we|you", "must|should|seem to|appear to", "now|", "be"])
+            || at.eat_each(&["looks like|it looks like|seems like", "we|you", "are"]);
+        likely.then_some(LIKELY)
+    });
     let who = at.eat_any(
         "here we are|now we are|and now we are|we are|you are|i am|we have arrived|we have now arrived|we have just arrived|\
-         we just arrived|you have arrived|we have come|we have just come|we might be|we may be|we could be|\
-         we must be|we seem to be",
+         we just arrived|you have arrived|we have come|we have just come|we find ourselves|we have ended up|we ended up",
     );
+    let said_who = who.is_some() || doubtful.is_some();
     // "Back at the lobby" does without.
-    if who.is_none() && at.peek(0) != "back" {
+    if !said_who && at.peek(0) != "back" {
         return None;
     }
-    let (mut back, mut inside, mut denied) = (false, false, false);
+    let (mut back, mut inside, mut denied, mut unsure) = (false, false, false, false);
     loop {
         if at.eat_any("back|again|once again|still").is_some() {
             back = true;
@@ -150,8 +156,10 @@ fn we_are(at: &mut Cursor) -> Option<Readings> {
             denied = true;
         } else if at.eat_any("inside of|inside").is_some() {
             inside = true;
+        } else if at.eat_any("probably|most likely|likely|maybe|perhaps|i think|i believe").is_some() {
+            unsure = true;
         } else if at
-            .eat_any("now|here|right|all|just|finally|currently|standing|already|at last|probably|actually|really|definitely")
+            .eat_any("now|here|right|all|just|finally|currently|standing|sitting|located|already|at last|actually|really|definitely|basically|obviously")
             .is_none()
         {
             break;
@@ -163,12 +171,37 @@ fn we_are(at: &mut Cursor) -> Option<Readings> {
         return Some(one(if denied { negate(same) } else { same }));
     }
     *at = start;
-    let readings = inside_of(at, back, inside, who.is_some()).or_else(|| {
+    let readings = inside_of(at, back, inside, said_who).or_else(|| {
         *at = start;
         (!alone && !inside).then(|| related_predicate(at, Head::Here)).flatten()
     })?;
     // "We aren't back at the lobby": not there, be it another lobby or none.
+    let certainty = readings.certainty * doubtful.unwrap_or(1.0) * if unsure { LIKELY } else { 1.0 };
+    let readings = Readings { certainty, ..readings };
     Some(if denied { readings.map(plain).map(negate) } else { readings })
+}
+
+/// "We have been here before" (true), "we have never been in this room" (false).
+fn been(at: &mut Cursor) -> Option<bool> {
+    let start = *at;
+    let who = "we|you|i";
+    let here = "here|in here|in this room|in this place|in this hallway|in this area|to this room|to this place|at this place|\
+        through here|through this room|by here|past here|this way|down here|down this hallway|down this hall|on this floor";
+    let before = "before|already|earlier|once before|once already|a minute ago|a moment ago|a while ago|a second ago|\
+        a few minutes ago|just now|at the start|last time";
+    let seen = "seen|visited|passed|passed by|been to";
+    let spot = "this place|this room|this area|this hallway|this one|this spot|this";
+    let said = at.eat_each(&[who, "have|were", "already|all|definitely|actually|", "been|come|walked|gone|passed|", here, before])
+        || at.eat_each(&[who, "were|have", "already|", "been|", here])  && matches!(start.peek(2), "already")
+        || at.eat_each(&[who, "have", "already|definitely|", seen, spot, before])
+        || at.eat_each(&["this is", "somewhere|a place|a room", "that|", who, "have", "already|", "been|been to|been in|seen|visited", "before|already|"]);
+    if said {
+        return Some(true);
+    }
+    *at = start;
+    let never = at.eat_each(&[who, "have|were", "not|never", "yet|ever|actually|", "been|come|", here, "before|yet|until now|"])
+        || at.eat_each(&[who, "have", "not|never", seen, spot, "before|yet|"]);
+    never.then_some(false)
 }
 
 /// Without what is said of having been there before.
@@ -215,15 +248,17 @@ pub(super) fn plausible(phrase: &NounPhrase) -> bool {
 /// The place is called `phrase`, with what comes after the name.
 pub(super) fn called(at: &mut Cursor, head: Head, phrase: NounPhrase, mut again: bool) -> Readings {
     at.skip(ON_FLOOR);
+    if head == Head::Previous {
+        at.skip("back there|there");
+    }
     let mut start = false;
     while !at.at_end() {
         let before = *at;
         at.eat(",");
-        if at.eat_any(AS_BEFORE).is_some() {
+        if as_before(at) {
             again = true;
         } else if at
-            .eat_any("we started in|we started from|we started at|we began in|that we started in")
-            .is_some()
+            .eat_each(&["that|which|where|", "we|you|i", "first|", "started|began|set off|set out|started out|came in", "in|from|at|through|"])
             || at.pointer().is_some_and(|p| p.head == Head::Start)
         {
             start = true;

@@ -8,7 +8,7 @@ use super::copula::{Copula, EVEN, LIKELY};
 use super::cursor::Cursor;
 use super::describe::attribute;
 use super::label::{named, plausible};
-use super::names::Kind;
+use super::names::{Kind, Name};
 use super::noun_phrase::{Determiner, NounPhrase};
 use super::pointed::where_kept;
 use super::relate::Related;
@@ -43,7 +43,7 @@ const FINDING: &str = "find|see|notice|spot|come to|come across|come upon|run in
 /// Reads a clause that locates something.
 pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
-    for form in [wanted, presented, inverted, said_of_places] {
+    for form in [wanted, presented, at_fork, inverted, said_of_places] {
         if let Some(readings) = form(at) {
             return Some(readings);
         }
@@ -102,8 +102,22 @@ fn inverted(at: &mut Cursor) -> Option<Readings> {
     })
 }
 
+/// "The right branch is a dead end": what lies on that side of the fork.
+fn at_fork(at: &mut Cursor) -> Option<Readings> {
+    at.eat("the").then_some(())?;
+    let side = at.eat_any("left|right")?;
+    at.eat_any("branch|fork|side of the fork|path")?;
+    at.copula().filter(|c| !c.negated && !c.past)?;
+    let figures = figures(at, true)?;
+    let fork = Phrase::new(Head::Named(Name::new("fork")?));
+    let relation = if side == "left" { R::LeftSide } else { R::RightSide };
+    let plain: Vec<Weighed<Phrase>> = figures.iter().map(|f| vec![(1.0, f.phrase.clone())]).collect();
+    Some(locate_all(&plain, &vec![(1.0, vec![Related::to(relation, fork)])]))
+}
+
 /// "The kitchen and the lounge are down the hall", "the last office on the left is Nick's".
 fn said_of_places(at: &mut Cursor) -> Option<Readings> {
+    let neither = at.eat("neither");
     let (subjects, told) = subjects(at)?;
     let start = *at;
     if let [subject] = subjects.as_slice()
@@ -128,7 +142,8 @@ fn said_of_places(at: &mut Cursor) -> Option<Readings> {
         return None;
     }
     let readings = predicate(at, &subjects, &told, &verb)?;
-    Some(shaped(readings, &verb))
+    let readings = shaped(readings, &verb);
+    Some(if neither { readings.map(negate) } else { readings })
 }
 
 /// The subjects with what tells them, each with its readings.
@@ -150,7 +165,7 @@ fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> 
         subject.phrase = readings.first().map_or(subject.phrase, |(_, p)| p.clone());
         plain.push(subject);
         told.push(readings);
-        let more = at.eat_any("and also|as well as|and").is_some() || (at.before() == "," && at.lists());
+        let more = at.eat_any("and also|as well as|and|nor|along with|together with").is_some() || (at.before() == "," && at.lists());
         if plain.len() >= MAX_FIGURES || !more {
             return Some((plain, told));
         }

@@ -144,6 +144,8 @@ fn expand(words: &[Word]) -> Vec<Word> {
         let stem = |stem: &str| Word { text: stem.to_owned(), capital: word.capital };
         if let Some(apart) = contraction(text) {
             out.extend(apart.split(' ').map(small));
+        } else if text == "r" && at > 0 && starts_place_phrase(next) {
+            out.push(small("are"));
         } else if text == "its" && (starts_place_phrase(next) || matches!(next, "the" | "a" | "an")) {
             out.extend(["it", "is"].map(small));
         } else if let Some(verb) = text.strip_suffix("n't") {

@@ -66,7 +66,11 @@ fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<R
     let start = *at;
     if so_called(at) {
         // "This place is called Nirvana"; "this is called teamwork" is less clear.
-        return named(at).filter(|p| spot || plausible(p)).map(|p| called(at, head, p, false));
+        let name = named(at).filter(|p| spot || plausible(p))?;
+        if head == Head::It {
+            return Some(one(Content::Alias { what: Phrase::new(head), also: name.phrase }));
+        }
+        return Some(called(at, head, name, false));
     }
     if let Some(same) = same_place(at, &head) {
         return Some(one(same));

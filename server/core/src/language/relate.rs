@@ -240,7 +240,7 @@ impl Cursor<'_> {
         let definite = matches!(read.determiner, Determiner::Definite | Determiner::Demonstrative);
         let fits = match read.kind {
             Kind::Place => true,
-            Kind::Thing => !matches!(read.determiner, Determiner::None | Determiner::Demonstrative),
+            Kind::Thing => read.determiner != Determiner::None,
             Kind::Open => definite,
             Kind::Vague if read.name().is_some_and(|n| n.as_str() == "building") => definite,
             Kind::Vague => definite && (read.is_told() || read.determiner == Determiner::Demonstrative),

@@ -20,7 +20,7 @@ pub(super) const FILLERS: &str = ",|and|so|ok|okay|now|um|uh|er|erm|hmm|well|alr
     excuse me|at last|robot|everyone|everybody|ladies and gentlemen|folks|guys|good ,|great ,|right ,|like|but|\
     remember that|remember|note that|notice that|i know that|i know|i am sure that|i am sure|in this building|\
     on this floor ,|let us see|as i said|like i said|as we said|as i told you|of course|turns out|it turns out that|as you come in|as you walk in|as you enter ,|when you come in|when you walk in|if you come in|\
-    from here|from where we are|\
+    from here|from where we are|earlier|before|\
     it turns out|see|and here|if you look|that said";
 /// Said after a clause; changes nothing (a map is one level).
 pub(super) const TAGS: &str = "now|right now|here|right here|over here|today|too|as well|also|then|everyone|everybody|guys|\
@@ -122,7 +122,7 @@ struct Lead {
 impl Lead {
     fn read(&mut self, at: &mut Cursor) {
         loop {
-            if at.sees("everyone calls|everybody calls") {
+            if at.sees("everyone calls|everybody calls|everyone here|everybody here|folks around|folks here|folks call|folks also") {
                 return;
             }
             if at.eat_any(AGAIN).is_some() {

@@ -245,7 +245,7 @@ pub(super) const FUNCTION_WORDS: &[&str] = &[
     "both", "brings", "but", "by", "bye", "call", "called", "came", "can", "cannot", "come",
     "comes", "connects", "contain", "containing", "contains", "could", "did", "do", "does", "doing",
     "done", "down", "downstairs", "during", "each", "earlier", "either", "else", "ends", "enter", "ever",
-    "every", "everybody", "everyone", "everywhere", "except", "exits", "facing", "farther", "feel",
+    "every", "everybody", "everyone", "everywhere", "except", "exits", "faces", "facing", "farther", "feel",
     "felt", "few", "find", "folks", "for", "forget", "forks", "from", "further", "get", "gets",
     "getting", "go", "goes", "going", "gone", "got", "guess", "guys", "had", "has", "have",
     "having", "he", "hello", "her", "here", "hers", "hey", "him", "his", "holding", "hope",
