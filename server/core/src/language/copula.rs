@@ -48,7 +48,7 @@ impl Cursor<'_> {
         let mut c = PLAIN;
         self.adverbs(&mut c);
         let verb = self.eat_any(
-            "is going to be|are going to be|used to be|has always been|will not be|will probably be|will be|would be|\
+            "can not be|could not be|is going to be|are going to be|used to be|has always been|will not be|will probably be|will be|would be|\
              should not be|should be|shall be|must be|has to be|have to be|might not be|might be|may not be|may be|\
              could be|can be found|can be reached|is reached|are reached|can be|is located|are located|is situated|are situated|seems to be|seem to be|\
              appears to be|looks to be|looks like|sits|lies|stands|comes|come|is|are|am|was|were",
@@ -62,6 +62,7 @@ impl Cursor<'_> {
         c.future = verb.starts_with("will") || verb.contains("going to");
         c.former = verb == "used to be";
         c.certainty *= match verb {
+            "can not be" | "could not be" => LIKELY,
             "might not be" | "might be" | "may not be" | "may be" | "could be" | "can be" => EVEN,
             "should be" | "should not be" | "must be" | "seems to be" | "seem to be" | "appears to be"
             | "looks to be" | "looks like" | "would be" | "will probably be" => LIKELY,

@@ -11,7 +11,7 @@ use super::locate::{located, renamed};
 const MARKS: &str = "no , no|no wait|no|nope|sorry|my bad|my mistake|my apologies|forget what i said|forget that|never mind that|never mind|i was wrong about that|i was wrong|i was mistaken|\
     i am wrong|that was wrong|that is wrong|that is not right|that is not correct|that is incorrect|wrong|correction|\
     scratch that|i made a mistake|i misspoke|let me correct myself|let me correct that|i take that back|actually|\
-    in fact|i meant to say|i meant|i mean|oops|wait no|wait|i should say|rather|or rather|to be precise|i stand corrected|\
+    in fact|i meant to say|i meant|i mean|oops|wait no|wait|hold on|hang on|i should say|rather|or rather|to be precise|i stand corrected|\
     not really|that was not right|strike that";
 /// Said between what is taken back and what holds.
 const MENDS: &str = "no wait|no , wait|wait , no|wait no|i mean|i meant to say|i meant|sorry|or rather|rather|make that|correction|\

@@ -218,8 +218,10 @@ fn been_here(same: bool) -> Content {
 
 /// "In the gym", after "we are".
 fn inside_of(at: &mut Cursor, back: bool, inside: bool, said_who: bool) -> Option<Readings> {
+    at.eat_any("in the middle of|in the heart of|in the center of|right in the middle of").filter(|_| at.sees("the|our|a"));
+    let middle = at.before() == "of";
     let on = at.eat("on");
-    if !(on || inside || at.eat_any("in|at|by").is_some() || (back && said_who && at.eat("to"))) {
+    if !(on || inside || middle || at.eat_any("in|at|by").is_some() || (back && said_who && at.eat("to"))) {
         return None;
     }
     // "On the terrace", but not "on the same page".

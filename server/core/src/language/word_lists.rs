@@ -251,7 +251,7 @@ pub(super) const FUNCTION_WORDS: &[&str] = &[
     "having", "he", "hello", "her", "here", "hers", "hey", "him", "his", "holding", "hope",
     "houses", "how", "however", "i", "if", "in", "inside", "into", "is", "isn", "it", "its", "just",
     "keep", "kept", "know", "known", "lead", "leading", "leads", "leave", "let", "lets", "lies",
-    "like", "located", "look", "looked", "looking", "looks", "made", "make", "many", "maybe", "me",
+    "like", "live", "lives", "located", "look", "looked", "looking", "looks", "made", "make", "many", "maybe", "me",
     "might", "mine", "more", "most", "much", "must", "my", "named", "near", "need", "needs",
     "neither", "never", "no", "nobody", "nor", "not", "now", "nowhere", "off", "often", "ok",
     "okay", "on", "only", "onto", "opens", "opposite", "or", "our", "ours", "outside", "over",
