@@ -44,17 +44,62 @@ fn asks_route(at: &mut Cursor) -> bool {
     let best = "best|fastest|quickest|shortest|easiest|right|";
     let to = "to|towards|into";
     let politely = "can|could|would|will|";
-    at.eat_each(&["how", "do|can|would|could|should|might|will|did|", WHO_MAYBE, "best|", "get|go|walk|find my way|find our way|find the way|make it|drive", "from here|", to])
-        || at.eat_each(&["how", "do|can|would|could|should", WHO, "reach"])
+    at.eat_each(&[
+        "how",
+        "do|can|would|could|should|might|will|did|",
+        WHO_MAYBE,
+        "best|",
+        "get|go|walk|find my way|find our way|find the way|make it|drive",
+        "from here|",
+        to,
+    ]) || at.eat_each(&["how", "do|can|would|could|should", WHO, "reach"])
         || at.eat_each(&["how to", "get|go|walk", "from here|", to])
-        || at.eat_each(&["what is|which is|is this|where is|do you know|i need|", "the", best, "way|route|path|directions", "from here|", "to|for getting to"])
+        || at.eat_each(&[
+            "what is|which is|is this|where is|do you know|i need|",
+            "the",
+            best,
+            "way|route|path|directions",
+            "from here|",
+            "to|for getting to",
+        ])
         || at.eat_each(&["which way", "is it|do i go|should i go|do we go|", "to"])
-        || at.eat_each(&[politely, "you|", "please|", "take|bring|lead|guide|walk|direct|point|drive|escort|show|send", "me|us", "the way|over|back|", to])
+        || at.eat_each(&[
+            politely,
+            "you|",
+            "please|",
+            "take|bring|lead|guide|walk|direct|point|drive|escort|show|send",
+            "me|us",
+            "the way|over|back|",
+            to,
+        ])
         || at.eat_each(&["point|direct|steer", "me|us", "in the direction of"])
-        || at.eat_each(&["can|could|would|will", "you", "please|", "point", "me|us", "in the direction of|towards"])
-        || at.eat_each(&[politely, "you|", "please|", "tell me|show me|explain|give me|do you know|know", "how to get|how i get|how we get|the way|directions|the directions", "from here|", to])
-        || at.eat_each(&["i|we", "need to|want to|have to|would like to|am trying to|are trying to", "get|go", "from here|", to])
-        || at.eat_any("directions to|do you know the way to|do you know how to get to|is this the way to").is_some()
+        || at.eat_each(&[
+            "can|could|would|will",
+            "you",
+            "please|",
+            "point",
+            "me|us",
+            "in the direction of|towards",
+        ])
+        || at.eat_each(&[
+            politely,
+            "you|",
+            "please|",
+            "tell me|show me|explain|give me|do you know|know",
+            "how to get|how i get|how we get|the way|directions|the directions",
+            "from here|",
+            to,
+        ])
+        || at.eat_each(&[
+            "i|we",
+            "need to|want to|have to|would like to|am trying to|are trying to",
+            "get|go",
+            "from here|",
+            to,
+        ])
+        || at
+            .eat_any("directions to|do you know the way to|do you know how to get to|is this the way to")
+            .is_some()
 }
 
 const WHO_MAYBE: &str = "i|we|you|one|somebody|someone|";
@@ -137,7 +182,9 @@ fn ask_what(at: &mut Cursor) -> Option<Content> {
     *at = start;
     let left = "leave|pass|come from|come out of|walk past|walk by|walk through|go past|go by|go through|see|visit|exit";
     if at.eat_each(&["what|which", PLACE_WORD, "did", "we|you|i", "just|", left])
-        || at.eat_any("what was the room we just left|what was that room|what was that place|what was that").is_some()
+        || at
+            .eat_any("what was the room we just left|what was that room|what was that place|what was that")
+            .is_some()
     {
         at.skip("back there|there|just now|we just left|we just passed");
         return at.at_break().then(|| ask(Question::What, Phrase::new(Head::Previous)));
@@ -167,9 +214,18 @@ fn ask_what(at: &mut Cursor) -> Option<Content> {
 fn asks_what_here(at: &mut Cursor) -> bool {
     let start = *at;
     let people = "you|they|we|people|i|everyone|everybody|one";
-    at.eat_each(&["what is", "the name of|the name for", "this place|this room|this area|the place|the room|this spot|this building|this"])
-        || at.eat_each(&["what|which", "kind of|type of|sort of|", PLACE_WORD, "is", THIS])
-        || at.eat_each(&["what|which", PLACE_WORD, "are we|am i|are you", "now|standing|currently|", "in|at|on|entering|looking at|standing in|"])
+    at.eat_each(&[
+        "what is",
+        "the name of|the name for",
+        "this place|this room|this area|the place|the room|this spot|this building|this",
+    ]) || at.eat_each(&["what|which", "kind of|type of|sort of|", PLACE_WORD, "is", THIS])
+        || at.eat_each(&[
+            "what|which",
+            PLACE_WORD,
+            "are we|am i|are you",
+            "now|standing|currently|",
+            "in|at|on|entering|looking at|standing in|",
+        ])
         || at.eat_each(&["what", "do|would|does|should|did", people, "usually|normally|", "call", THIS])
         || at.eat_each(&["what is", THIS])
         || at.eat_each(&["what", "are we|am i", "looking at|standing in|in"])
@@ -217,7 +273,12 @@ fn ask_far(at: &mut Cursor) -> Option<Content> {
 fn ask_whether(at: &mut Cursor, question: bool) -> Option<Content> {
     at.skip("do you know if|do you know whether|can you tell me if|could you tell me if|do you think that|do you think|\
         are you sure that|are you sure|so");
-    let past = at.eat_each(&["did|have", "we|you|i", "just|", "pass|passed|leave|left|go past|gone past|walk past|walked past|go by|walk by|come from|come out of"]);
+    let past = at.eat_each(&[
+        "did|have",
+        "we|you|i",
+        "just|",
+        "pass|passed|leave|left|go past|gone past|walk past|walked past|go by|walk by|come from|come out of",
+    ]);
     if past {
         let named = at.noun_phrase().filter(|p| p.kind == Kind::Place)?;
         let said = label(Head::Previous, named.phrase, Sameness::Open);

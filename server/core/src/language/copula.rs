@@ -62,10 +62,10 @@ impl Cursor<'_> {
         c.future = verb.starts_with("will") || verb.contains("going to");
         c.former = verb == "used to be";
         c.certainty *= match verb {
-            "can not be" | "could not be" => LIKELY,
             "might not be" | "might be" | "may not be" | "may be" | "could be" | "can be" => EVEN,
             "should be" | "should not be" | "must be" | "seems to be" | "seem to be" | "appears to be"
-            | "looks to be" | "looks like" | "would be" | "will probably be" => LIKELY,
+            | "looks to be" | "can not be" | "could not be" | "looks like" | "would be"
+            | "will probably be" => LIKELY,
             _ => 1.0,
         };
         self.adverbs(&mut c);

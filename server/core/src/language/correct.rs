@@ -23,7 +23,10 @@ pub(super) fn eat_mark(at: &mut Cursor) -> bool {
         return false;
     }
     // "No office has a sink" denies of all.
-    if at.peek(0) == "no" && !is_function_word(at.peek(1)) && !matches!(at.peek(1), "" | "," | "wait" | "sorry") {
+    if at.peek(0) == "no"
+        && !is_function_word(at.peek(1))
+        && !matches!(at.peek(1), "" | "," | "wait" | "sorry")
+    {
         return false;
     }
     at.eat_any(MARKS).is_some()

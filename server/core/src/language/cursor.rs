@@ -69,7 +69,8 @@ impl<'a> Cursor<'a> {
     /// `|` may be left out. The position is unchanged if a slot finds none.
     pub(super) fn eat_each(&mut self, slots: &[&'static str]) -> bool {
         let start = *self;
-        let all = slots.iter().all(|slot| slot.split('|').any(|phrase| phrase.is_empty() || self.eat(phrase)));
+        let all =
+            slots.iter().all(|slot| slot.split('|').any(|phrase| phrase.is_empty() || self.eat(phrase)));
         if !all {
             *self = start;
         }

@@ -85,7 +85,13 @@ fn presented_here(at: &mut Cursor) -> Option<Readings> {
         || at.eat_each(&["over here", "is"])
         || at.eat_each(&["we|you", "have|are|just", SO_FAR, SO_FAR, ARRIVED])
         || at.eat_each(&["we|you|i", "are", SO_FAR, "looking at|seeing|facing here", "here|"])
-        || at.eat_each(&["what", "we|you|i", "are looking at|are seeing|are standing in|are in|see|have", "here|", "is"]);
+        || at.eat_each(&[
+            "what",
+            "we|you|i",
+            "are looking at|are seeing|are standing in|are in|see|have",
+            "here|",
+            "is",
+        ]);
     let phrase = shown.then(|| named(at))?.filter(|p| named_so || plausible(p))?;
     Some(called(at, Head::Here, phrase, false))
 }
@@ -101,7 +107,8 @@ const ARRIVED: &str = "reached|entered|come to|come into|arrived at|arrived in|w
     got to|gotten to|reaching|entering|coming into|walking into|stepping into|arriving at|arriving in|\
     passing through|walking through|moving through|walking down|walking along|crossing";
 /// "This place", "it", as what has a name.
-const SPOT_OR_IT: &str = "this place|this room|this area|this space|this spot|this building|this location|this one|this";
+const SPOT_OR_IT: &str =
+    "this place|this room|this area|this space|this spot|this building|this location|this one|this";
 
 /// "We have returned to the lobby".
 fn returned(at: &mut Cursor) -> Option<Readings> {
@@ -135,7 +142,8 @@ fn we_are(at: &mut Cursor) -> Option<Readings> {
         return Some(one(been_here(false)));
     }
     let doubtful = at.eat_each(&["we|you", "might|may|could", "now|", "be"]).then_some(EVEN).or_else(|| {
-        let likely = at.eat_each(&["we|you", "must|should|seem to|appear to", "now|", "be"])
+        // "You should be at the door" is said of where the way will lead.
+        let likely = at.eat_each(&["we", "must|should|seem to|appear to", "now|", "be"])
             || at.eat_each(&["looks like|it looks like|seems like", "we|you", "are"]);
         likely.then_some(LIKELY)
     });
@@ -191,16 +199,51 @@ fn been(at: &mut Cursor) -> Option<bool> {
         a few minutes ago|just now|at the start|last time";
     let seen = "seen|visited|passed|passed by|been to";
     let spot = "this place|this room|this area|this hallway|this one|this spot|this";
-    let said = at.eat_each(&[who, "have|were", "already|all|definitely|actually|", "been|come|walked|gone|passed|", here, before])
-        || at.eat_each(&[who, "were|have", "already|", "been|", here])  && matches!(start.peek(2), "already")
+    let said = at.eat_each(&[
+        who,
+        "have|were",
+        "already|all|definitely|actually|",
+        "been|come|walked|gone|passed|",
+        here,
+        before,
+    ]) || at.eat_each(&[who, "were|have", "already|", "been|", here])
+        && matches!(start.peek(2), "already")
         || at.eat_each(&[who, "have", "already|definitely|", seen, spot, before])
-        || at.eat_each(&["this is", "somewhere|a place|a room", "that|", who, "have", "already|", "been|been to|been in|seen|visited", "before|already|"]);
+        || at.eat_each(&[
+            who,
+            "already",
+            "passed|passed by|saw|visited|came past|came by|went past|went by",
+            spot,
+        ])
+        || at.eat_each(&[
+            who,
+            "passed|passed by|saw|visited|came past|came by|went past|went by",
+            spot,
+            before,
+        ])
+        || at.eat_each(&[
+            "this is",
+            "somewhere|a place|a room",
+            "that|",
+            who,
+            "have",
+            "already|",
+            "been|been to|been in|seen|visited",
+            "before|already|",
+        ]);
     if said {
         return Some(true);
     }
     *at = start;
-    let never = at.eat_each(&[who, "have|were", "not|never", "yet|ever|actually|", "been|come|", here, "before|yet|until now|"])
-        || at.eat_each(&[who, "have", "not|never", seen, spot, "before|yet|"]);
+    let never = at.eat_each(&[
+        who,
+        "have|were",
+        "not|never",
+        "yet|ever|actually|",
+        "been|come|",
+        here,
+        "before|yet|until now|",
+    ]) || at.eat_each(&[who, "have", "not|never", seen, spot, "before|yet|"]);
     never.then_some(false)
 }
 
@@ -218,7 +261,8 @@ fn been_here(same: bool) -> Content {
 
 /// "In the gym", after "we are".
 fn inside_of(at: &mut Cursor, back: bool, inside: bool, said_who: bool) -> Option<Readings> {
-    at.eat_any("in the middle of|in the heart of|in the center of|right in the middle of").filter(|_| at.sees("the|our|a"));
+    at.eat_any("in the middle of|in the heart of|in the center of|right in the middle of")
+        .filter(|_| at.sees("the|our|a"));
     let middle = at.before() == "of";
     let on = at.eat("on");
     if !(on || inside || middle || at.eat_any("in|at|by").is_some() || (back && said_who && at.eat("to"))) {
@@ -259,9 +303,13 @@ pub(super) fn called(at: &mut Cursor, head: Head, phrase: NounPhrase, mut again:
         at.eat(",");
         if as_before(at) {
             again = true;
-        } else if at
-            .eat_each(&["that|which|where|", "we|you|i", "first|", "started|began|set off|set out|started out|came in", "in|from|at|through|"])
-            || at.pointer().is_some_and(|p| p.head == Head::Start)
+        } else if at.eat_each(&[
+            "that|which|where|",
+            "we|you|i",
+            "first|",
+            "started|began|set off|set out|started out|came in",
+            "in|from|at|through|",
+        ]) || at.pointer().is_some_and(|p| p.head == Head::Start)
         {
             start = true;
         } else {

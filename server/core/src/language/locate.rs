@@ -4,42 +4,21 @@
 use super::act::{Content, Head, Locate, Owner, Phrase, Sameness};
 use super::attach::{Chain, Weighed};
 use super::build::{Readings, label, locate_all, negate, one, shaped};
-use super::copula::{Copula, EVEN, LIKELY};
+use super::copula::{Copula, LIKELY};
 use super::cursor::Cursor;
 use super::describe::attribute;
 use super::label::{named, plausible};
-use super::names::{Kind, Name};
+use super::leads::{at_fork, leads};
+use super::names::Kind;
 use super::noun_phrase::{Determiner, NounPhrase};
 use super::pointed::where_kept;
+use super::presents::presents;
 use super::relate::Related;
 use super::relation::Relation as R;
 use super::repair::{guessed, mended};
 
 /// Figures of one clause ("the kitchen and the lounge are …").
 const MAX_FIGURES: usize = 4;
-/// Shows something that the listener need not know: how sure it is, and whether it is no longer there.
-fn presents(at: &mut Cursor) -> Option<(f64, bool)> {
-    let also = "also|actually|always|only|";
-    if at.eat_each(&["there", "used to be"]) {
-        return Some((1.0, true));
-    }
-    if at.eat_each(&["there", also, "might|may|could", "also|", "be"]) {
-        return Some((EVEN, false));
-    }
-    if at.eat_each(&["there", also, "must|ought to|should|seems to|appears to", "also|", "be"]) {
-        return Some((LIKELY, false));
-    }
-    let there = at.eat_each(&["there", also, "is|are|will be|happens to be|happen to be"])
-        || at.eat_each(&["we|you|they", also, "have got|have|keep|store", "got|"])
-        || at.eat_each(&["we|you|they|one", also, "will|can|should|would|may|", also, "be able to|", FINDING])
-        || at.eat_each(&["we|you", "are", "now|just|", "passing|coming up on|coming up to|approaching|going past|going by|walking past"]);
-    there.then_some((1.0, false))
-}
-
-/// How "you" come upon a place.
-const FINDING: &str = "find|see|notice|spot|come to|come across|come upon|run into|encounter|hit|get to|reach|pass by|pass|\
-    have";
-
 /// Reads a clause that locates something.
 pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
@@ -102,19 +81,6 @@ fn inverted(at: &mut Cursor) -> Option<Readings> {
     })
 }
 
-/// "The right branch is a dead end": what lies on that side of the fork.
-fn at_fork(at: &mut Cursor) -> Option<Readings> {
-    at.eat("the").then_some(())?;
-    let side = at.eat_any("left|right")?;
-    at.eat_any("branch|fork|side of the fork|path")?;
-    at.copula().filter(|c| !c.negated && !c.past)?;
-    let figures = figures(at, true)?;
-    let fork = Phrase::new(Head::Named(Name::new("fork")?));
-    let relation = if side == "left" { R::LeftSide } else { R::RightSide };
-    let plain: Vec<Weighed<Phrase>> = figures.iter().map(|f| vec![(1.0, f.phrase.clone())]).collect();
-    Some(locate_all(&plain, &vec![(1.0, vec![Related::to(relation, fork)])]))
-}
-
 /// "The kitchen and the lounge are down the hall", "the last office on the left is Nick's".
 fn said_of_places(at: &mut Cursor) -> Option<Readings> {
     let neither = at.eat("neither");
@@ -153,8 +119,12 @@ fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> 
     at.skip("both");
     loop {
         let mut subject = at.noun_phrase()?;
-        at.eat_each(&["that|which|", "we|you|i", "are looking for|are after|want|need|asked about|asked for|mentioned|\
-            are going to|were asking about|told you about|are heading to|are heading for"]);
+        at.eat_each(&[
+            "that|which|",
+            "we|you|i",
+            "are looking for|are after|want|need|asked about|asked for|mentioned|\
+            are going to|were asking about|told you about|are heading to|are heading for",
+        ]);
         let relative = at.eat_any(", which is|, which are|, located|, situated").is_some();
         let chain = at.chain(true);
         if relative && (chain.is_empty() || at.at_end()) {
@@ -165,7 +135,8 @@ fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> 
         subject.phrase = readings.first().map_or(subject.phrase, |(_, p)| p.clone());
         plain.push(subject);
         told.push(readings);
-        let more = at.eat_any("and also|as well as|and|nor|along with|together with").is_some() || (at.before() == "," && at.lists());
+        let more = at.eat_any("and also|as well as|and|nor|along with|together with").is_some()
+            || (at.before() == "," && at.lists());
         if plain.len() >= MAX_FIGURES || !more {
             return Some((plain, told));
         }
@@ -323,44 +294,13 @@ fn belongs(at: &mut Cursor, subject: &NounPhrase, readings: &Weighed<Phrase>) ->
     place.then(|| Readings::new(all.collect()))
 }
 
-/// "This hallway leads to the gym".
-fn leads(at: &mut Cursor, subject: &NounPhrase) -> Option<Readings> {
-    let definite = matches!(subject.determiner, Determiner::Definite | Determiner::Demonstrative);
-    let way = matches!(subject.kind, Kind::Place | Kind::Vague) && definite;
-    at.skip("also|then|here|directly|just|right");
-    let relation = lead(at)?;
-    let (landmark, sure) = at.landmark()?;
-    (way && sure).then(|| one(super::build::locate(&subject.phrase, &Related::to(relation, landmark))))
-}
-
-/// "Leads to", "takes you back into", "faces": how what the subject is lies to what follows.
-fn lead(at: &mut Cursor) -> Option<R> {
-    at.eat_any("will|would|can");
-    let goes = "leads|lead|goes|go|takes|take|brings|bring|runs|run|opens out|opens|open|connects|connect|gets|get|continues";
-    let way = "up|down|out|back|straight|right|directly|over|all the way|";
-    if at.eat_each(&[goes, "you|us|one|people|", way, way, "to|into|onto"]) {
-        return Some(R::To);
-    }
-    if at.eat_each(&["goes|go|runs|run|leads|lead|takes you", way, "past|by"]) {
-        return Some(R::Past);
-    }
-    if at.eat_each(&["goes|go|runs|run", "along|alongside"]) {
-        return Some(R::Along);
-    }
-    if at.eat_any("adjoins|adjoin|borders|abuts").is_some() {
-        return Some(R::NextTo);
-    }
-    at.eat_any("faces|face|looks onto|is facing")?;
-    Some(R::AcrossFrom)
-}
-
 pub(super) fn is_door(phrase: &Phrase) -> bool {
     let Head::Named(name) = &phrase.head else { return phrase.head == Head::Place };
     ["door", "doorway", "opening"].iter().any(|d| name.as_str().ends_with(d))
 }
 
 /// The figures of a clause, without what follows them.
-fn figures(at: &mut Cursor, presented: bool) -> Option<Vec<NounPhrase>> {
+pub(super) fn figures(at: &mut Cursor, presented: bool) -> Option<Vec<NounPhrase>> {
     let mut all = vec![at.noun_phrase()?];
     while all.len() < MAX_FIGURES {
         let start = *at;

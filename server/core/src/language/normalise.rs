@@ -170,7 +170,8 @@ const UNFINISHED: &str = "is are was were the a an in at on to of by this that w
 /// What one says while one seeks a word.
 const HESITATIONS: &str = "um uh er erm uhm hmm eh";
 /// Words that speakers repeat while they seek the next.
-const REPEATED: &str = "the a is are in at on to of we you it this by here and our past near behind down through";
+const REPEATED: &str =
+    "the a is are in at on to of we you it this by here and our past near behind down through";
 
 fn among(list: &str, word: &str) -> bool {
     list.split(' ').any(|w| w == word)

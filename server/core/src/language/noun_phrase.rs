@@ -275,8 +275,23 @@ impl Cursor<'_> {
                 && counted(word).is_some()
                 && matches!(
                     next,
-                    "floor" | "floors" | "level" | "levels" | "flights" | "flight" | "story" | "stories"
-                        | "door" | "doors" | "rooms" | "offices" | "meters" | "metres" | "feet" | "yards" | "steps"
+                    "floor"
+                        | "floors"
+                        | "level"
+                        | "levels"
+                        | "flights"
+                        | "flight"
+                        | "story"
+                        | "stories"
+                        | "door"
+                        | "doors"
+                        | "rooms"
+                        | "offices"
+                        | "meters"
+                        | "metres"
+                        | "feet"
+                        | "yards"
+                        | "steps"
                 ) =>
             {
                 false

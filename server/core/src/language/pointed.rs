@@ -37,9 +37,26 @@ fn subject(at: &mut Cursor) -> Option<Head> {
         return Some(Head::Previous);
     }
     let spot = "place|room|area|space|spot|one|building|hallway|corridor|floor|part of the building";
-    if at.eat_each(&["the", spot, "that|which|", "we|you|i", "are", "now|currently|just|", "standing|all|", "in|at|entering|looking at", "now|right now|here|currently|"])
-        || at.eat_each(&["the", spot, "where|", "we|you|i", "are", "now|currently|", "standing|", "now|right now|"])
-    {
+    if at.eat_each(&[
+        "the",
+        spot,
+        "that|which|",
+        "we|you|i",
+        "are",
+        "now|currently|just|",
+        "standing|all|",
+        "in|at|entering|looking at",
+        "now|right now|here|currently|",
+    ]) || at.eat_each(&[
+        "the",
+        spot,
+        "where|",
+        "we|you|i",
+        "are",
+        "now|currently|",
+        "standing|",
+        "now|right now|",
+    ]) {
         return Some(Head::Here);
     }
     let here = at.eat_any(
@@ -49,8 +66,13 @@ fn subject(at: &mut Cursor) -> Option<Head> {
     if here.is_some() || at.eat_any(SPOT).is_some() {
         return Some(Head::Here);
     }
-    if at.eat_any("that place over there|that place|that room over there|that room|that one over there|that one|\
-        that right there|that over there|that there|those over there|the one over there|the room over there").is_some() {
+    if at
+        .eat_any(
+            "that place over there|that place|that room over there|that room|that one over there|that one|\
+        that right there|that over there|that there|those over there|the one over there|the room over there",
+        )
+        .is_some()
+    {
         return Some(Head::There);
     }
     let word = at.eat_any("this|these|right here|here|those|that|it")?;
@@ -103,9 +125,12 @@ fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<R
 pub(super) fn so_called(at: &mut Cursor) -> bool {
     let by = "we|they|people|everyone|everybody|folks|students|i|you";
     let calls = "call|calls|refer to as|refers to as|know as|knows as|named";
-    let called = "called|known as|named|referred to as|known to everyone as|nicknamed|labeled|labelled|dubbed";
-    let thing = "what|the room|the place|the area|the space|the one|the so called|a room|a place|an area|a space";
-    let often = "all|also|usually|like to|often|commonly|affectionately|generally|sometimes|better|otherwise|";
+    let called =
+        "called|known as|named|referred to as|known to everyone as|nicknamed|labeled|labelled|dubbed";
+    let thing =
+        "what|the room|the place|the area|the space|the one|the so called|a room|a place|an area|a space";
+    let often =
+        "all|also|usually|like to|often|commonly|affectionately|generally|sometimes|better|otherwise|";
     at.eat_each(&[thing, "that|which|", by, often, calls])
         || at.eat_each(&[thing, "that is|which is|is|", often, called])
         || at.eat_each(&[often, called])

@@ -69,11 +69,10 @@ impl Cursor<'_> {
             .is_some();
         if noun {
             self.skip("that|which|where");
-            let left = self.eat_any("we|you|i").is_some()
-                && {
-                    self.skip("have|had|just|all|were just|were last|were|only just");
-                    self.eat_any(LEFT_BEHIND).is_some() || self.before() == "were"
-                };
+            let left = self.eat_any("we|you|i").is_some() && {
+                self.skip("have|had|just|all|were just|were last|were|only just");
+                self.eat_any(LEFT_BEHIND).is_some() || self.before() == "were"
+            };
             if left {
                 self.skip("just now|before|earlier|a moment ago|a minute ago|a second ago");
                 return true;

@@ -80,7 +80,10 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ("to the west of|on the west side of|at the west end of|west of", R::WestOf),
     ("upstairs from", R::LevelUp),
     ("downstairs from", R::LevelDown),
-    ("at the top of|at the bottom of|at the foot of|at the head of|at the corner of|at the base of|at the start of|at the beginning of|at the front of|at the mouth of", R::At),
+    (
+        "at the top of|at the bottom of|at the foot of|at the head of|at the corner of|at the base of|at the start of|at the beginning of|at the front of|at the mouth of",
+        R::At,
+    ),
     (
         "in the middle of|in the center of|in the centre of|at the center of|at the back of|in the back of|in the corner of",
         R::In,

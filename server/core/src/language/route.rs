@@ -6,9 +6,9 @@ use super::attach::Weighed;
 use super::build::Readings;
 use super::cursor::Cursor;
 use super::locate::locate_clause;
+use super::notation::{phrase_notation, relation_notation};
 use super::relate::Related;
 use super::relation::Relation as R;
-use super::notation::{phrase_notation, relation_notation};
 
 /// Steps of one route that are read.
 const STEPS_MAX: usize = 24;

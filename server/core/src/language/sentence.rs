@@ -2,7 +2,7 @@
 //! it is read: one unread word and it says nothing to us, since half a sentence may say the opposite of
 //! the whole.
 
-use super::act::{About, Content, Question, Reason, Sameness};
+use super::act::{About, Content, Head, Question, Reason, Sameness};
 use super::aside::{idiom, order};
 use super::ask::ask_clause;
 use super::build::{Readings, negate, one};
@@ -79,6 +79,11 @@ fn clauses(sentence: &Sentence, mut marked: bool) -> Option<(Vec<Readings>, bool
             next = mend(&mut at, last);
         }
         let mut readings = next?;
+        // At the end of a way one is not here.
+        let led = matches!(last, Some(Content::Route { .. }));
+        if led && readings.first().iter().any(is_here) {
+            return None;
+        }
         finish(&mut at, &mut readings, &mut lead)?;
         // What says itself what it corrects needs no mark.
         marked &= !readings.first().iter().any(|c| matches!(c, Content::Correct { .. }));
@@ -96,6 +101,15 @@ fn clauses(sentence: &Sentence, mut marked: bool) -> Option<(Vec<Readings>, bool
 }
 
 /// A correction may follow without a pause: "this is the kitchen not the gym".
+/// Does it say what or where the place held is?
+fn is_here(said: &Content) -> bool {
+    match said {
+        Content::Label { at, .. } => at.head == Head::Here,
+        Content::Locate(locate) => locate.figure.head == Head::Here,
+        _ => false,
+    }
+}
+
 fn mends(at: &Cursor) -> bool {
     at.sees("not|no|sorry|i mean|or rather|rather|make that")
 }
