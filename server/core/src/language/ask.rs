@@ -50,16 +50,16 @@ fn asks_route(at: &mut Cursor) -> bool {
         WHO_MAYBE,
         "best|",
         "get|go|walk|find my way|find our way|find the way|make it|drive",
-        "from here|",
+        "from here|back|",
         to,
     ]) || at.eat_each(&["how", "do|can|would|could|should", WHO, "reach"])
-        || at.eat_each(&["how to", "get|go|walk", "from here|", to])
+        || at.eat_each(&["how to", "get|go|walk", "from here|back|", to])
         || at.eat_each(&[
             "what is|which is|is this|where is|do you know|i need|",
             "the",
             best,
             "way|route|path|directions",
-            "from here|",
+            "from here|back|",
             "to|for getting to",
         ])
         || at.eat_each(&["which way", "is it|do i go|should i go|do we go|", "to"])
@@ -87,14 +87,14 @@ fn asks_route(at: &mut Cursor) -> bool {
             "please|",
             "tell me|show me|explain|give me|do you know|know",
             "how to get|how i get|how we get|the way|directions|the directions",
-            "from here|",
+            "from here|back|",
             to,
         ])
         || at.eat_each(&[
             "i|we",
             "need to|want to|have to|would like to|am trying to|are trying to",
             "get|go",
-            "from here|",
+            "from here|back|",
             to,
         ])
         || at
@@ -186,7 +186,7 @@ fn ask_what(at: &mut Cursor) -> Option<Content> {
             .eat_any("what was the room we just left|what was that room|what was that place|what was that")
             .is_some()
     {
-        at.skip("back there|there|just now|we just left|we just passed");
+        at.skip("back there|there|just now|we just left|we just passed|called");
         return at.at_break().then(|| ask(Question::What, Phrase::new(Head::Previous)));
     }
     *at = start;
@@ -228,6 +228,7 @@ fn asks_what_here(at: &mut Cursor) -> bool {
         ])
         || at.eat_each(&["what", "do|would|does|should|did", people, "usually|normally|", "call", THIS])
         || at.eat_each(&["what is", THIS])
+        || at.eat_each(&["what", "do you think|would you say", THIS, "is"])
         || at.eat_each(&["what", "are we|am i", "looking at|standing in|in"])
         || {
             *at = start;

@@ -85,6 +85,11 @@ impl Cursor<'_> {
             self.eat("next door");
             return Some(Related::to(R::NextTo, here()));
         }
+        // "The fifth door down".
+        let counted = matches!(self.before(), "door" | "room" | "office" | "one");
+        if counted && matches!(self.peek(1), "is" | "was" | "" | ",") && self.eat("down") {
+            return Some(Related::to(R::Down, here()));
+        }
         if self
             .eat_any(
                 "around here|close by|near by|near here|close to here|not far from here|not far away|not far",

@@ -58,7 +58,7 @@ fn people_call(at: &mut Cursor) -> Option<Readings> {
         at.eat_any("we|they|people|everyone|everybody|students|folks|i|you can|you")?;
     }
     at.skip("all|also|usually|just|like to|always|sometimes|often|normally|would|could|tend to|generally");
-    at.eat_any("call|calls|refer to|refers to|know")?;
+    at.eat_any("call|calls|refer to|refers to|know|named|nicknamed|have named|have nicknamed|dubbed|christened|baptized")?;
     let spot = at.eat_any(SPOT).is_some();
     if spot || at.eat_any("this|these").is_some() {
         at.eat("as");

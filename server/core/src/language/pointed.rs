@@ -68,7 +68,7 @@ fn subject(at: &mut Cursor) -> Option<Head> {
     }
     if at
         .eat_any(
-            "that place over there|that place|that room over there|that room|that one over there|that one|\
+            "that back there|that place over there|that place|that room over there|that room|that one over there|that one|\
         that right there|that over there|that there|those over there|the one over there|the room over there",
         )
         .is_some()

@@ -136,7 +136,14 @@ struct Lead {
 impl Lead {
     fn read(&mut self, at: &mut Cursor) {
         loop {
-            if at.sees("everyone calls|everybody calls|everyone here|everybody here|folks around|folks here|folks call|folks also") {
+            // "Everyone calls it …", "folks here call it …" are subjects.
+            let group = matches!(at.peek(0), "everyone" | "everybody" | "folks");
+            if group
+                && matches!(
+                    at.peek(1),
+                    "calls" | "call" | "just" | "also" | "here" | "around" | "usually" | "refers" | "knows"
+                )
+            {
                 return;
             }
             if at.eat_any(AGAIN).is_some() {
