@@ -7,6 +7,7 @@ use super::cursor::Cursor;
 use super::locate::locate_clause;
 use super::names::{Kind, Name};
 use super::noun_phrase::{Determiner, NounPhrase};
+use super::pointed::same_place;
 use super::relate::Related;
 use super::relation::Relation;
 
@@ -180,6 +181,12 @@ fn ask_what(at: &mut Cursor) -> Option<Content> {
         }
     }
     *at = start;
+    if at.eat_each(&["what", "is|are", "that|those", "place|room|area|spot|", "over there|there|"])
+        && at.at_break()
+    {
+        return Some(ask(Question::What, Phrase::new(Head::There)));
+    }
+    *at = start;
     let left = "leave|pass|come from|come out of|walk past|walk by|walk through|go past|go by|go through|see|visit|exit";
     if at.eat_each(&["what|which", PLACE_WORD, "did", "we|you|i", "just|", left])
         || at
@@ -191,7 +198,8 @@ fn ask_what(at: &mut Cursor) -> Option<Content> {
     }
     *at = start;
     let mut x = Phrase::new(Head::Unknown);
-    if at.eat_any("what else is|what is there|what is|what are|what lies|what would i find|what do you find|what will i find|what can i find|what do we have|what else is there").is_some() {
+    if at.eat_each(&["what", "else|", "do|can|will|would", "you|we|i", "see|find|have"])
+        || at.eat_any("what else is|what is there|what is|what are|what lies|what would i find|what do you find|what will i find|what can i find|what do we have|what else is there").is_some() {
         // "What is the room next to the gym?"
         if let Some(noun) = at.noun_phrase().filter(|p| p.determiner == Determiner::Definite || at.sees("is")) {
             x = noun.phrase;
@@ -199,6 +207,11 @@ fn ask_what(at: &mut Cursor) -> Option<Content> {
     } else {
         at.eat_any("which|what")?;
         let noun = at.noun_phrase().filter(|p| p.determiner == Determiner::None)?;
+        if at.eat_each(&["leads|lead|goes|go|takes you|takes me", "up|down|out|back|", "to|into"]) {
+            x = noun.phrase;
+            x.within.push(Related::to(Relation::To, at.landmark()?.0).restriction());
+            return Some(ask(Question::What, x));
+        }
         at.eat_any("is|are|lies")?;
         x = noun.phrase;
     }
@@ -320,6 +333,11 @@ fn asked_statement(at: &mut Cursor) -> Option<Content> {
             Head::Here
         };
         at.skip("really|actually|still|also|again|called");
+        let start = *at;
+        if let Some(same) = same_place(at, &head) {
+            return Some(same);
+        }
+        *at = start;
         let named = at.noun_phrase().filter(|p| matches!(p.kind, Kind::Place | Kind::Open));
         return named.map(|p| label(head, p.phrase, Sameness::Open));
     }

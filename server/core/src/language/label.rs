@@ -149,7 +149,7 @@ fn we_are(at: &mut Cursor) -> Option<Readings> {
     });
     let who = at.eat_any(
         "here we are|now we are|and now we are|we are|you are|i am|we have arrived|we have now arrived|we have just arrived|\
-         we just arrived|you have arrived|we have come|we have just come|we find ourselves|we have ended up|we ended up",
+         we just arrived|you have arrived|we have come|we have just come|we find ourselves|the robot is|we have ended up|we ended up",
     );
     let said_who = who.is_some() || doubtful.is_some();
     // "Back at the lobby" does without.

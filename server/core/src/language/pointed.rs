@@ -277,23 +277,33 @@ pub(super) fn where_kept(at: &mut Cursor) -> Option<Phrase> {
         place.features.purpose = thing.name().map(|n| format!("have {n}"));
         return at.at_break().then_some(place);
     }
-    let verb = at.eat_any(DOING)?;
+    let verb = base_form(at.eat_any(DOING)?);
     let rest = at.take_to_break();
     place.features.purpose = Some([&[verb], rest.as_slice()].concat().join(" "));
     (rest.len() <= 4).then_some(place)
 }
 
-/// What people do at places.
+/// "Work" of "works": in the list of verbs it comes next.
+fn base_form(verb: &'static str) -> &'static str {
+    let third_person = verb.split(' ').next().is_some_and(|w| w.ends_with('s'));
+    let next = DOING.split('|').skip_while(|v| *v != verb).nth(1);
+    next.filter(|_| third_person).unwrap_or(verb)
+}
+
+/// What people do at places; the base form of a verb comes after its form in -s.
 const DOING: &str = "eats|eat|drinks|drink|meets|meet|works out|work out|works|work|sleeps|sleep|cooks|cook|parks|park|\
     prints|print|studies|study|relaxes|relax|rests|rest|hangs out|hang out|smokes|smoke|plays|play|exercises|exercise|\
-    holds|hold|teaches|teach|have|has|takes|take|makes|make|washes|wash|waits|wait|gathers|gather|sits|sit|reads|read|\
+    holds|hold|teaches|teach|has|have|takes|take|makes|make|washes|wash|waits|wait|gathers|gather|sits|sit|reads|read|\
     picks up|pick up|drops off|drop off|checks in|check in|checks out|check out|trains|train|builds|build|tests|test|\
-    practices|practice|registers|register|signs in|sign in|give|gives|run|runs|do|does|recycle|charge|present|repair|\
-    fix|record|rehearse|pray|nap|shower|change|vote|swim|stay|live|lives|line up|queue|order|pay|buy|get together";
+    practices|practice|registers|register|signs in|sign in|gives|give|runs|run|does|do|recycle|charge|present|repair|\
+    fix|record|rehearse|pray|nap|shower|change|vote|swim|stay|lives|live|line up|queue|order|pay|buy|get together";
 
 /// "The grad students": who does something, before what is done.
 fn people(at: &mut Cursor) -> Option<()> {
-    at.eat_any("all the|most of the|the|our|most|all|some|my")?;
+    let someone = at.word().is_some_and(|w| w.capital);
+    if at.eat_any("all the|most of the|the|our|most|all|some|my").is_none() && !someone {
+        return None;
+    }
     for _ in 0..3 {
         at.word().filter(|w| w.text != COMMA)?;
         at.step();

@@ -85,7 +85,8 @@ const PREPOSITIONS: [(&str, R); 34] = [
         R::At,
     ),
     (
-        "in the middle of|in the center of|in the centre of|at the center of|at the back of|in the back of|in the corner of",
+        "in the middle of|in the center of|in the centre of|at the center of|at the back of|in the back of|in the corner of|in the far corner of|in the back corner of|\
+      at the far corner of",
         R::In,
     ),
     ("inside of|inside|within|into|in", R::In),
