@@ -5,8 +5,8 @@ use super::cursor::Cursor;
 
 /// How sure words of doubt are: what people take them to mean in surveys of verbal probabilities (after
 /// Kent, "Words of Estimative Probability", 1964: probable 0.75, chances about even 0.5).
-const LIKELY: f64 = 0.75;
-const EVEN: f64 = 0.5;
+pub(super) const LIKELY: f64 = 0.75;
+pub(super) const EVEN: f64 = 0.5;
 
 /// "Is probably not".
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +48,7 @@ impl Cursor<'_> {
         let mut c = PLAIN;
         self.adverbs(&mut c);
         let verb = self.eat_any(
-            "is going to be|are going to be|used to be|has always been|will not be|will probably be|will be|would be|\
+            "can not be|could not be|is going to be|are going to be|used to be|has always been|will not be|will probably be|will be|would be|\
              should not be|should be|shall be|must be|has to be|have to be|might not be|might be|may not be|may be|\
              could be|can be found|can be reached|is reached|are reached|can be|is located|are located|is situated|are situated|seems to be|seem to be|\
              appears to be|looks to be|looks like|sits|lies|stands|comes|come|is|are|am|was|were",
@@ -64,7 +64,8 @@ impl Cursor<'_> {
         c.certainty *= match verb {
             "might not be" | "might be" | "may not be" | "may be" | "could be" | "can be" => EVEN,
             "should be" | "should not be" | "must be" | "seems to be" | "seem to be" | "appears to be"
-            | "looks to be" | "looks like" | "would be" | "will probably be" => LIKELY,
+            | "looks to be" | "can not be" | "could not be" | "looks like" | "would be"
+            | "will probably be" => LIKELY,
             _ => 1.0,
         };
         self.adverbs(&mut c);

@@ -4,13 +4,14 @@ use super::act::{Act, Content, Head, Locate, Phrase, Sameness};
 use super::build::{Readings, label, locate_all, negate, one};
 use super::cursor::Cursor;
 use super::label::{named, plausible};
+use super::lexicon::is_function_word;
 use super::locate::{located, renamed};
 
 /// Said before a clause: what was said before was wrong.
 const MARKS: &str = "no , no|no wait|no|nope|sorry|my bad|my mistake|my apologies|forget what i said|forget that|never mind that|never mind|i was wrong about that|i was wrong|i was mistaken|\
     i am wrong|that was wrong|that is wrong|that is not right|that is not correct|that is incorrect|wrong|correction|\
     scratch that|i made a mistake|i misspoke|let me correct myself|let me correct that|i take that back|actually|\
-    in fact|i meant to say|i meant|i mean|oops|wait no|wait|i should say|rather|or rather|to be precise|i stand corrected|\
+    in fact|i meant to say|i meant|i mean|oops|wait no|wait|hold on|hang on|i should say|rather|or rather|to be precise|i stand corrected|\
     not really|that was not right|strike that";
 /// Said between what is taken back and what holds.
 const MENDS: &str = "no wait|no , wait|wait , no|wait no|i mean|i meant to say|i meant|sorry|or rather|rather|make that|correction|\
@@ -19,6 +20,13 @@ const MENDS: &str = "no wait|no , wait|wait , no|wait no|i mean|i meant to say|i
 /// Steps over words that take something back; false if there are none.
 pub(super) fn eat_mark(at: &mut Cursor) -> bool {
     if at.sees("no longer|no one|sorry to|actually ,") && at.peek(1) != "," {
+        return false;
+    }
+    // "No office has a sink" denies of all.
+    if at.peek(0) == "no"
+        && !is_function_word(at.peek(1))
+        && !matches!(at.peek(1), "" | "," | "wait" | "sorry")
+    {
         return false;
     }
     at.eat_any(MARKS).is_some()
@@ -44,11 +52,14 @@ pub(super) fn renaming(at: &mut Cursor) -> Option<Readings> {
     }
     *at = start;
     at.eat_any(
-        "i called this place|i called this|i said this is|i said this was|i said that this was|i told you this was|i said we were in|i thought this was")?;
+        "i called this place|i called this room|i called this|i said this is|i said this was|i said this place was|\
+         i said this room was|i said that this was|i said it was|i told you this was|i told you that this was|\
+         i said we were in|i said we were at|i thought this was|i thought we were in|i thought it was")?;
     let was = named(at)?;
-    at.skip(",");
-    at.eat_any("but|and")?;
-    at.eat_any("it is|this is|we are in|that is")?;
+    at.skip(",|earlier|before|just now|a minute ago|a moment ago");
+    at.eat_any("but actually|but|and|yet|although|though")?;
+    at.skip("actually|really|in fact");
+    at.eat_any("it is|this is|we are in|that is|it was")?;
     at.skip("actually|really|in fact");
     let is = named(at).filter(plausible)?;
     let said = |what: Phrase| Box::new(label(Head::Here, what, Sameness::Open));
@@ -122,7 +133,7 @@ pub(super) fn mend(at: &mut Cursor, last: &Content) -> Option<Readings> {
         return instead(at, last).map(|readings| readings.map(negate));
     }
     if let Content::Negate(denied) = last {
-        at.skip("but|rather|instead|no|it is|this is|that is|,");
+        at.skip("but|rather|instead|no|it is|this is|that is|it was|that was|,");
         return instead(at, denied);
     }
     at.eat_any(MENDS)?;

@@ -65,6 +65,18 @@ impl<'a> Cursor<'a> {
         phrases.split('|').find(|phrase| self.eat(phrase))
     }
 
+    /// Steps over one phrase of each slot, in order ("we", "have just|just", "passed"); a slot that ends in
+    /// `|` may be left out. The position is unchanged if a slot finds none.
+    pub(super) fn eat_each(&mut self, slots: &[&'static str]) -> bool {
+        let start = *self;
+        let all =
+            slots.iter().all(|slot| slot.split('|').any(|phrase| phrase.is_empty() || self.eat(phrase)));
+        if !all {
+            *self = start;
+        }
+        all
+    }
+
     /// Does one of these phrases stand here?
     pub(super) fn sees(&self, phrases: &'static str) -> bool {
         let mut ahead = *self;

@@ -23,6 +23,7 @@ impl Cursor<'_> {
         }
         self.eat_any("on|to|at")?;
         let whose = self.eat_any("the|your|my|our|its")?;
+        self.skip("immediate|very|far|near");
         let left = self.eat_any("left|right")? == "left";
         self.skip("hand|side");
         let (of, along) = if left { (R::LeftOf, R::LeftSide) } else { (R::RightOf, R::RightSide) };
@@ -84,6 +85,11 @@ impl Cursor<'_> {
             self.eat("next door");
             return Some(Related::to(R::NextTo, here()));
         }
+        // "The fifth door down".
+        let counted = matches!(self.before(), "door" | "room" | "office" | "one");
+        if counted && matches!(self.peek(1), "is" | "was" | "" | ",") && self.eat("down") {
+            return Some(Related::to(R::Down, here()));
+        }
         if self
             .eat_any(
                 "around here|close by|near by|near here|close to here|not far from here|not far away|not far",
@@ -106,7 +112,7 @@ impl Cursor<'_> {
             return Some(Related::to(R::AwayFrom, here()));
         }
         if !self.sees("there is|there are|there will|there should")
-            && self.eat_any("over there|there").is_some()
+            && self.eat_any("over there|there|that way|over that way|down that way|back that way").is_some()
         {
             return Some(Related::to(R::At, Phrase::new(Head::There)));
         }

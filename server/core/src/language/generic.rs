@@ -73,9 +73,7 @@ fn kinds(at: &mut Cursor) -> Option<Content> {
         .filter(|p| p.kind == Kind::Place || (p.kind == Kind::Vague && quantity.is_some()))?;
     let bare = figure.determiner == Determiner::None && figure.is_plural();
     quantity = quantity.or_else(|| at.quantity_adverb());
-    if !(bare || quantity.is_some())
-        || matches!(figure.determiner, Determiner::Demonstrative | Determiner::Possessive)
-    {
+    if matches!(figure.determiner, Determiner::Demonstrative | Determiner::Possessive) {
         return None;
     }
     let relation =
@@ -85,6 +83,11 @@ fn kinds(at: &mut Cursor) -> Option<Content> {
             at.eat_any("tend to be|are|is|will be|lie|should be")?;
             at.skip("all|both|located|found|situated");
             quantity = quantity.or_else(|| at.quantity_adverb());
+            // "A kitchen is next to the lab" is one kitchen.
+            if !bare && quantity.is_none() {
+                return None;
+            }
+            at.skip("located|found|situated");
             let related = at.related()?;
             let landmark = related.landmarks.into_iter().next()?;
             let quantity = quantity.unwrap_or(Quantity::All);
@@ -96,6 +99,9 @@ fn kinds(at: &mut Cursor) -> Option<Content> {
                 quantity,
             });
         };
+    if !bare && quantity.is_none() {
+        return None;
+    }
     at.skip("their own|its own|some|at least");
     let landmark = at.noun_phrase()?;
     if matches!(landmark.determiner, Determiner::Definite | Determiner::Demonstrative)

@@ -2,6 +2,7 @@
 
 use super::act::{Content, Head, Phrase, Sameness};
 use super::build::{Readings, label, locate_all, negate, one};
+use super::copula::{EVEN, LIKELY};
 use super::cursor::Cursor;
 use super::names::Kind;
 use super::noun_phrase::{Determiner, NounPhrase};
@@ -11,10 +12,19 @@ use super::pointed::{pointed, related_predicate, same_place};
 pub(super) const SPOT: &str = "this place here|this over here|this one over here|this place|this room here|this room|this area|this space|this spot|this building|\
     this location|this one here|this one";
 /// "As before": the place so called is one seen before.
-const AS_BEFORE: &str = "as before|as earlier|as last time|from before|from earlier|we saw before|we saw earlier|\
-    we were in before|we were in earlier|that we saw before|that we were in before|we have seen before|as we saw before|\
-    we visited before|we visited earlier|where we were before|where we were earlier|we passed before|we passed earlier|\
-    we came through before|we were at before|again|once again|once more";
+const AS_BEFORE: &str = "as before|as earlier|as last time|from before|from earlier|where we were before|\
+    where we were earlier|from last time|again|once again|once more|as the last time|as the one before";
+
+/// "As before", "that we walked down earlier".
+fn as_before(at: &mut Cursor) -> bool {
+    let did = "saw|see|seen|were in|were at|in|been in|been at|been to|visited|passed by|passed|passed through|came through|\
+        came down|came by|walked through|walked down|walked past|walked along|went through|went down|went past|looked at|\
+        stopped at|stopped in|were|went to|came across";
+    let when = "before|earlier|already|last time|a minute ago|a moment ago|a while ago|just now|previously|at first|a while back|\
+        a few minutes ago";
+    at.eat_any(AS_BEFORE).is_some()
+        || at.eat_each(&["that|which|as|where|", "we|you|i", "have|had|", "just|already|", did, when])
+}
 /// Says nothing of where the place is (a map is one level).
 const ON_FLOOR: &str = "of the building|of this building|in this building|in the building|to the building|to this building|\
     on this floor|on our floor|on the ground floor|on the first floor|on the second floor|on the third floor|\
@@ -41,9 +51,14 @@ fn welcome(at: &mut Cursor) -> Option<Readings> {
 
 /// "They call this place the Z-center", "we call it the fishbowl".
 fn people_call(at: &mut Cursor) -> Option<Readings> {
-    at.eat_any("we|they|people|everyone|everybody|the students|students|i|most people|some people|you can")?;
-    at.skip("all|also|usually|just|like to|always|sometimes|often|normally");
-    at.eat_any("call|calls|refer to")?;
+    let named_group = at.eat_any("the students|the staff|the faculty|the locals|the grad students|the undergrads|\
+        some people|most people|some of us|most of us|lots of people|a lot of people|many people|folks around here|\
+        people around here|people here|everyone here|everybody here|folks here");
+    if named_group.is_none() {
+        at.eat_any("we|they|people|everyone|everybody|students|folks|i|you can|you")?;
+    }
+    at.skip("all|also|usually|just|like to|always|sometimes|often|normally|would|could|tend to|generally");
+    at.eat_any("call|calls|refer to|refers to|know|named|nicknamed|have named|have nicknamed|dubbed|christened|baptized")?;
     let spot = at.eat_any(SPOT).is_some();
     if spot || at.eat_any("this|these").is_some() {
         at.eat("as");
@@ -64,23 +79,44 @@ fn people_call(at: &mut Cursor) -> Option<Readings> {
 
 /// "Here we have the kitchen", "we have reached the lobby".
 fn presented_here(at: &mut Cursor) -> Option<Readings> {
-    at.eat_any(
-        "over here we have|here we have|here you have|here you can see|here you see|here you will find|over here is|\
-         we have reached|we have now reached|we have entered|we have just entered|we just entered|we are entering|\
-         we are now entering|you are entering|you are now entering|we just reached|we have just reached|\
-         we just walked into|we have come to|we have arrived at|we have arrived in|you have reached|\
-         you have just entered|we have made it to|we are now coming into|we are coming into|\
-         what you see here is|what you are looking at is|what we have here is",
-    )?;
-    let phrase = named(at).filter(plausible)?;
+    let named_so = at.eat_each(&["the", "name of|name for", SPOT_OR_IT, "is|would be"]);
+    let shown = named_so
+        || at.eat_each(&["over here|right here|here", "we|you", "have|can see|see|will find|will see|find"])
+        || at.eat_each(&["over here", "is"])
+        || at.eat_each(&["we|you", "have|are|just", SO_FAR, SO_FAR, ARRIVED])
+        || at.eat_each(&["we|you|i", "are", SO_FAR, "looking at|seeing|facing here", "here|"])
+        || at.eat_each(&[
+            "what",
+            "we|you|i",
+            "are looking at|are seeing|are standing in|are in|see|have",
+            "here|",
+            "is",
+        ]);
+    let phrase = shown.then(|| named(at))?.filter(|p| named_so || plausible(p))?;
     Some(called(at, Head::Here, phrase, false))
 }
 
+/// What leaves a place behind one.
+pub(super) const LEFT_BEHIND: &str = "passed by|passed through|passed|left behind|left|come from|come out of|come through|\
+    came from|came out of|came through|walked past|walked by|walked through|walked out of|went past|went by|\
+    went through|gone past|gone by|gone through|exited|visited|saw|seen|in|at";
+/// Adverbs between "we have" and what was done.
+const SO_FAR: &str = "now|just|finally|already|all|at last|also|currently|";
+/// What brings one into a place.
+const ARRIVED: &str = "reached|entered|come to|come into|arrived at|arrived in|walked into|stepped into|made it to|\
+    got to|gotten to|reaching|entering|coming into|walking into|stepping into|arriving at|arriving in|\
+    passing through|walking through|moving through|walking down|walking along|crossing";
+/// "This place", "it", as what has a name.
+const SPOT_OR_IT: &str =
+    "this place|this room|this area|this space|this spot|this building|this location|this one|this";
+
 /// "We have returned to the lobby".
 fn returned(at: &mut Cursor) -> Option<Readings> {
+    at.eat_each(&["we|you", "have|are|", SO_FAR]).then_some(())?;
     at.eat_any(
-        "we have returned to|we returned to|we have made it back to|we have got back to|we are returning to|\
-         we came back to|you have returned to|we have gone back to|we went back to|we have circled back to",
+        "returned to|made it back to|got back to|gotten back to|returning to|came back to|come back to|gone back to|\
+         went back to|circled back to|looped back to|ended up back at|ended up back in|wound up back at|wound up back in|\
+         come full circle to|come full circle back to|ended up at|ended up in",
     )?;
     if let Some(like) = at.pointer() {
         let start = like.head == Head::Start;
@@ -92,42 +128,35 @@ fn returned(at: &mut Cursor) -> Option<Readings> {
 
 /// "We just passed the library".
 fn passed(at: &mut Cursor) -> Option<Readings> {
-    at.eat_any(
-        "we have just passed|we just passed|we have just left|we just left|we just came from|we just came out of|\
-         we have just come from|we have just come out of|you just passed|you have just passed|we were just in|\
-         we just walked past|we just walked out of|we just exited",
-    )?;
-    let phrase = named(at).filter(plausible)?;
+    let just = at.eat_each(&["we|you|i", "have just|just|were just", LEFT_BEHIND]);
+    let phrase = just.then(|| named(at))?.filter(plausible)?;
     Some(called(at, Head::Previous, phrase, false))
 }
 
 /// "We are back in the gym", "we are next to the gym", "we have been here before".
 fn we_are(at: &mut Cursor) -> Option<Readings> {
-    if at.eat_any("we have been here before|we have been here already|we have already been here|we were here before|\
-        we were here earlier|we were here already|we were already here|i have been here before|you have been here before|\
-        we have seen this place before|we have seen this before|we have seen this room before|we have been in this room before|\
-        we have been in here before|we have visited this place before")
-        .is_some()
-    {
-        return Some(one(been_here(true)));
+    if let Some(same) = been(at) {
+        return Some(one(been_here(same)));
     }
-    if at.eat_any("we have not been here before|we have never been here before|we have never been here|\
-        we have not been here yet|we have not been here|we were not here before|this is a new place|this is somewhere new|\
-        you have not been here before|you have never been here before|you have never been here")
-        .is_some()
-    {
+    if at.eat_any("this is a new place|this is somewhere new").is_some() {
         return Some(one(been_here(false)));
     }
+    let doubtful = at.eat_each(&["we|you", "might|may|could", "now|", "be"]).then_some(EVEN).or_else(|| {
+        // "You should be at the door" is said of where the way will lead.
+        let likely = at.eat_each(&["we", "must|should|seem to|appear to", "now|", "be"])
+            || at.eat_each(&["looks like|it looks like|seems like", "we|you", "are"]);
+        likely.then_some(LIKELY)
+    });
     let who = at.eat_any(
         "here we are|now we are|and now we are|we are|you are|i am|we have arrived|we have now arrived|we have just arrived|\
-         we just arrived|you have arrived|we have come|we have just come|we might be|we may be|we could be|\
-         we must be|we seem to be",
+         we just arrived|you have arrived|we have come|we have just come|we find ourselves|the robot is|we have ended up|we ended up",
     );
+    let said_who = who.is_some() || doubtful.is_some();
     // "Back at the lobby" does without.
-    if who.is_none() && at.peek(0) != "back" {
+    if !said_who && at.peek(0) != "back" {
         return None;
     }
-    let (mut back, mut inside, mut denied) = (false, false, false);
+    let (mut back, mut inside, mut denied, mut unsure) = (false, false, false, false);
     loop {
         if at.eat_any("back|again|once again|still").is_some() {
             back = true;
@@ -135,8 +164,10 @@ fn we_are(at: &mut Cursor) -> Option<Readings> {
             denied = true;
         } else if at.eat_any("inside of|inside").is_some() {
             inside = true;
+        } else if at.eat_any("probably|most likely|likely|maybe|perhaps|i think|i believe").is_some() {
+            unsure = true;
         } else if at
-            .eat_any("now|here|right|all|just|finally|currently|standing|already|at last|probably|actually|really|definitely")
+            .eat_any("now|here|right|all|just|finally|currently|standing|sitting|located|already|at last|actually|really|definitely|basically|obviously")
             .is_none()
         {
             break;
@@ -148,12 +179,72 @@ fn we_are(at: &mut Cursor) -> Option<Readings> {
         return Some(one(if denied { negate(same) } else { same }));
     }
     *at = start;
-    let readings = inside_of(at, back, inside, who.is_some()).or_else(|| {
+    let readings = inside_of(at, back, inside, said_who).or_else(|| {
         *at = start;
         (!alone && !inside).then(|| related_predicate(at, Head::Here)).flatten()
     })?;
     // "We aren't back at the lobby": not there, be it another lobby or none.
+    let certainty = readings.certainty * doubtful.unwrap_or(1.0) * if unsure { LIKELY } else { 1.0 };
+    let readings = Readings { certainty, ..readings };
     Some(if denied { readings.map(plain).map(negate) } else { readings })
+}
+
+/// "We have been here before" (true), "we have never been in this room" (false).
+fn been(at: &mut Cursor) -> Option<bool> {
+    let start = *at;
+    let who = "we|you|i";
+    let here = "here|in here|in this room|in this place|in this hallway|in this area|to this room|to this place|at this place|\
+        through here|through this room|by here|past here|this way|down here|down this hallway|down this hall|on this floor";
+    let before = "before|already|earlier|once before|once already|a minute ago|a moment ago|a while ago|a second ago|\
+        a few minutes ago|just now|at the start|last time";
+    let seen = "seen|visited|passed|passed by|been to";
+    let spot = "this place|this room|this area|this hallway|this one|this spot|this";
+    let said = at.eat_each(&[
+        who,
+        "have|were",
+        "already|all|definitely|actually|",
+        "been|come|walked|gone|passed|",
+        here,
+        before,
+    ]) || at.eat_each(&[who, "were|have", "already|", "been|", here])
+        && matches!(start.peek(2), "already")
+        || at.eat_each(&[who, "have", "already|definitely|", seen, spot, before])
+        || at.eat_each(&[
+            who,
+            "already",
+            "passed|passed by|saw|visited|came past|came by|went past|went by",
+            spot,
+        ])
+        || at.eat_each(&[
+            who,
+            "passed|passed by|saw|visited|came past|came by|went past|went by",
+            spot,
+            before,
+        ])
+        || at.eat_each(&[
+            "this is",
+            "somewhere|a place|a room",
+            "that|",
+            who,
+            "have",
+            "already|",
+            "been|been to|been in|seen|visited",
+            "before|already|",
+        ]);
+    if said {
+        return Some(true);
+    }
+    *at = start;
+    let never = at.eat_each(&[
+        who,
+        "have|were",
+        "not|never",
+        "yet|ever|actually|",
+        "been|come|",
+        here,
+        "before|yet|until now|",
+    ]) || at.eat_each(&[who, "have", "not|never", seen, spot, "before|yet|"]);
+    never.then_some(false)
 }
 
 /// Without what is said of having been there before.
@@ -170,8 +261,11 @@ fn been_here(same: bool) -> Content {
 
 /// "In the gym", after "we are".
 fn inside_of(at: &mut Cursor, back: bool, inside: bool, said_who: bool) -> Option<Readings> {
+    at.eat_any("in the middle of|in the heart of|in the center of|right in the middle of")
+        .filter(|_| at.sees("the|our|a"));
+    let middle = at.before() == "of";
     let on = at.eat("on");
-    if !(on || inside || at.eat_any("in|at|by").is_some() || (back && said_who && at.eat("to"))) {
+    if !(on || inside || middle || at.eat_any("in|at|by").is_some() || (back && said_who && at.eat("to"))) {
         return None;
     }
     // "On the terrace", but not "on the same page".
@@ -200,16 +294,22 @@ pub(super) fn plausible(phrase: &NounPhrase) -> bool {
 /// The place is called `phrase`, with what comes after the name.
 pub(super) fn called(at: &mut Cursor, head: Head, phrase: NounPhrase, mut again: bool) -> Readings {
     at.skip(ON_FLOOR);
+    if head == Head::Previous {
+        at.skip("back there|there");
+    }
     let mut start = false;
     while !at.at_end() {
         let before = *at;
         at.eat(",");
-        if at.eat_any(AS_BEFORE).is_some() {
+        if as_before(at) {
             again = true;
-        } else if at
-            .eat_any("we started in|we started from|we started at|we began in|that we started in")
-            .is_some()
-            || at.pointer().is_some_and(|p| p.head == Head::Start)
+        } else if at.eat_each(&[
+            "that|which|where|",
+            "we|you|i",
+            "first|",
+            "started|began|set off|set out|started out|came in",
+            "in|from|at|through|",
+        ]) || at.pointer().is_some_and(|p| p.head == Head::Start)
         {
             start = true;
         } else {

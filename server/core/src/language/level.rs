@@ -35,14 +35,17 @@ impl Cursor<'_> {
 
     /// "Two floors up", "one level below the lobby".
     fn levels_away(&mut self) -> Option<Related> {
+        let first = if self.sees("up the|down the") { None } else { self.eat_any("up|down") };
         let (n, words) = self.number()?;
         self.advance(words);
         self.skip("more");
         self.eat_any("floors|floor|levels|level|flights of stairs|flight of stairs|flights|flight|stories|storey|story")?;
-        let up = matches!(
-            self.eat_any("further up|further down|up|down|above|below|higher|lower")?,
-            "up" | "above" | "higher" | "further up"
-        );
+        // "One floor up", "up one floor".
+        let way = match first {
+            Some(way) => way,
+            None => self.eat_any("further up|further down|up|down|above|below|higher|lower")?,
+        };
+        let up = matches!(way, "up" | "above" | "higher" | "further up");
         self.skip("from");
         let from = self.landmark().map_or_else(|| Phrase::new(Head::Here), |(phrase, _)| phrase);
         let me = matches!(from.head, Head::Agent | Head::Speaker);

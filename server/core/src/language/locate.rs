@@ -4,29 +4,25 @@
 use super::act::{Content, Head, Locate, Owner, Phrase, Sameness};
 use super::attach::{Chain, Weighed};
 use super::build::{Readings, label, locate_all, negate, one, shaped};
-use super::copula::Copula;
+use super::copula::{Copula, LIKELY};
 use super::cursor::Cursor;
 use super::describe::attribute;
 use super::label::{named, plausible};
+use super::leads::{at_fork, leads};
 use super::names::Kind;
 use super::noun_phrase::{Determiner, NounPhrase};
 use super::pointed::where_kept;
+use super::presents::presents;
 use super::relate::Related;
 use super::relation::Relation as R;
 use super::repair::{guessed, mended};
 
 /// Figures of one clause ("the kitchen and the lounge are …").
 const MAX_FIGURES: usize = 4;
-/// Shows something that the listener need not know.
-const PRESENT: &str = "there is also|there are also|there is|there are|there will be|there should be|there used to be|\
-    we also have|we have got|we have|you have got|you have|you will find|you can find|you find|you will see|you can see|\
-    you see|we find|you will come to|you will be able to see|you should see|you should find|we will find|we will see|\
-    you can get to|you get to|you can reach|you reach|we will pass|we pass|you pass|you will also find|you can also find|you will also see|you will pass|we have also got";
-
 /// Reads a clause that locates something.
 pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
-    for form in [wanted, presented, inverted, said_of_places] {
+    for form in [wanted, presented, at_fork, inverted, said_of_places] {
         if let Some(readings) = form(at) {
             return Some(readings);
         }
@@ -38,35 +34,45 @@ pub(super) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
 /// "If you are looking for the library, it's down the hall".
 fn wanted(at: &mut Cursor) -> Option<Readings> {
     at.eat_any(
-        "if you are looking for|if you need|if you want|if you are going to|if you have to go to|for",
+        "if you are looking for|if you need to find|if you need to get to|if you need to go to|if you ever need|\
+         if you need|if you want to find|if you want to get to|if you want to go to|if you want|if you are going to|\
+         if you have to go to|if you are trying to find|if you are trying to get to|as for|for",
     )?;
     let figures = figures(at, true)?;
     at.skip(",|then");
-    at.eat_any("it is|they are|that is|you can find it|you will find it|you can find them")?;
+    at.eat_any("it is|they are|that is|that would be|that will be|you can find it|you will find it|you can find them|\
+        you will find them|you can find one|you will find one|there is one|there are some|there are a few|\
+        there is a pair|there are several|we have one|we keep them|we keep it|go|look|try")?;
     located(&figures, &at.chain(false))
 }
 
 /// "There is a lab next to the gym", "you can find the copier in the mail room".
 fn presented(at: &mut Cursor) -> Option<Readings> {
-    let verb = at.eat_any(PRESENT)?;
-    at.skip("actually|also|probably|even|only|just");
+    let (certainty, former) = presents(at)?;
+    at.skip("actually|also|even|only|just|all|our|the rest of");
+    let doubt = at.eat_any("probably|most likely|maybe|perhaps|likely").is_some();
     let none = at.eat_any("no|not a|not any|no other").is_some();
     let figures = figures(at, true)?;
     let here = at.eat_any("right here|in here|here|in this room").is_some() && at.at_break();
     let chain = if here { Chain::here() } else { at.chain(false) };
     // "You have a kitchen" says nothing; "there is a room" neither.
     let readings = located(&figures, &chain)?;
-    let denies = none ^ (verb == "there used to be");
-    Some(if denies { readings.map(negate) } else { readings })
+    let certainty = readings.certainty * certainty * if doubt { LIKELY } else { 1.0 };
+    let readings = Readings { certainty, ..readings };
+    Some(if none ^ former { readings.map(negate) } else { readings })
 }
 
 /// "Just past the entrance is the reception desk".
 fn inverted(at: &mut Cursor) -> Option<Readings> {
-    at.skip("here|over here|up here|down here|coming up|next up");
+    at.skip("here|over here|up here|down here|coming up|next up|if you look|when you look|look|looking");
     let chain = at.leading_chain();
     chain.first()?;
-    at.skip(",");
-    let verb = if at.eat_any(PRESENT).is_some() { None } else { Some(at.copula()?) };
+    let comma = at.eat(",");
+    if comma {
+        // "On your right, that's the lab".
+        at.eat_any("that|it|this").filter(|_| at.sees("is"));
+    }
+    let verb = if presents(at).is_some() { None } else { Some(at.copula()?) };
     let figures = figures(at, true)?;
     let readings = located(&figures, &chain)?;
     Some(match verb {
@@ -77,6 +83,7 @@ fn inverted(at: &mut Cursor) -> Option<Readings> {
 
 /// "The kitchen and the lounge are down the hall", "the last office on the left is Nick's".
 fn said_of_places(at: &mut Cursor) -> Option<Readings> {
+    let neither = at.eat("neither");
     let (subjects, told) = subjects(at)?;
     let start = *at;
     if let [subject] = subjects.as_slice()
@@ -91,12 +98,18 @@ fn said_of_places(at: &mut Cursor) -> Option<Readings> {
         return belongs(at, subject, readings);
     }
     *at = start;
-    let verb = at.copula()?;
+    // "The gym you'll find next to the lab"; "the gym, it's down the hall".
+    let found = at.eat_each(&["you", "will|can", "find|see|reach"]);
+    if at.before() == "," {
+        at.eat_any("it|they|that").filter(|_| at.sees("is|are"));
+    }
+    let verb = if found { super::copula::PLAIN } else { at.copula()? };
     if verb.quantity.is_some() {
         return None;
     }
     let readings = predicate(at, &subjects, &told, &verb)?;
-    Some(shaped(readings, &verb))
+    let readings = shaped(readings, &verb);
+    Some(if neither { readings.map(negate) } else { readings })
 }
 
 /// The subjects with what tells them, each with its readings.
@@ -106,6 +119,12 @@ fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> 
     at.skip("both");
     loop {
         let mut subject = at.noun_phrase()?;
+        at.eat_each(&[
+            "that|which|",
+            "we|you|i",
+            "are looking for|are after|want|need|asked about|asked for|mentioned|\
+            are going to|were asking about|told you about|are heading to|are heading for",
+        ]);
         let relative = at.eat_any(", which is|, which are|, located|, situated").is_some();
         let chain = at.chain(true);
         if relative && (chain.is_empty() || at.at_end()) {
@@ -116,7 +135,8 @@ fn subjects(at: &mut Cursor) -> Option<(Vec<NounPhrase>, Vec<Weighed<Phrase>>)> 
         subject.phrase = readings.first().map_or(subject.phrase, |(_, p)| p.clone());
         plain.push(subject);
         told.push(readings);
-        let more = at.eat_any("and also|as well as|and").is_some() || (at.before() == "," && at.lists());
+        let more = at.eat_any("and also|as well as|and|nor|along with|together with").is_some()
+            || (at.before() == "," && at.lists());
         if plain.len() >= MAX_FIGURES || !more {
             return Some((plain, told));
         }
@@ -274,30 +294,13 @@ fn belongs(at: &mut Cursor, subject: &NounPhrase, readings: &Weighed<Phrase>) ->
     place.then(|| Readings::new(all.collect()))
 }
 
-/// "This hallway leads to the gym".
-fn leads(at: &mut Cursor, subject: &NounPhrase) -> Option<Readings> {
-    let definite = matches!(subject.determiner, Determiner::Definite | Determiner::Demonstrative);
-    let way = matches!(subject.kind, Kind::Place | Kind::Vague) && definite;
-    at.skip("also|then");
-    let relation = match at.eat_any(
-        "leads back to|leads into|leads to|leads down to|leads up to|lead to|goes to|goes into|takes you to|\
-         brings you to|opens into|opens onto|opens to|runs past|goes past|leads past|runs along",
-    )? {
-        "runs past" | "goes past" | "leads past" => R::Past,
-        "runs along" => R::Along,
-        _ => R::To,
-    };
-    let (landmark, sure) = at.landmark()?;
-    (way && sure).then(|| one(super::build::locate(&subject.phrase, &Related::to(relation, landmark))))
-}
-
 pub(super) fn is_door(phrase: &Phrase) -> bool {
     let Head::Named(name) = &phrase.head else { return phrase.head == Head::Place };
     ["door", "doorway", "opening"].iter().any(|d| name.as_str().ends_with(d))
 }
 
 /// The figures of a clause, without what follows them.
-fn figures(at: &mut Cursor, presented: bool) -> Option<Vec<NounPhrase>> {
+pub(super) fn figures(at: &mut Cursor, presented: bool) -> Option<Vec<NounPhrase>> {
     let mut all = vec![at.noun_phrase()?];
     while all.len() < MAX_FIGURES {
         let start = *at;

@@ -44,7 +44,7 @@ impl Cursor<'_> {
     /// "About twenty meters".
     pub(super) fn distance(&mut self) -> Option<Distance> {
         let start = *self;
-        self.skip("about|approximately|around|roughly|maybe|like|nearly|almost|some|probably|another|only|just|perhaps");
+        self.skip("less than|more than|no more than|not more than|at most|at least|up to|a good|over|under|close to|about|approximately|around|roughly|maybe|like|nearly|almost|some|probably|another|only|just|perhaps");
         let found = self.number().and_then(|(value, words)| {
             self.advance(words);
             let unit = match self

@@ -84,6 +84,10 @@ impl Name {
             let told = modifiers.iter().any(|w| !is_weak(w) && !w.ends_with("est"));
             return if numbered || told { Kind::Place } else { Kind::Vague };
         }
+        // A desk is a place where it is somebody's.
+        if noun == "desk" && words[0].ends_with("'s") {
+            return Kind::Place;
+        }
         if is_thing(noun) || (at > 0 && is_thing(&words[at - 1..=at].join(" "))) {
             return Kind::Thing;
         }

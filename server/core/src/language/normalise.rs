@@ -28,7 +28,7 @@ pub(super) struct Sentence {
 pub(super) fn sentences(text: &str) -> Vec<Sentence> {
     let mut all = split(text);
     for sentence in &mut all {
-        sentence.words = expand(&sentence.words);
+        sentence.words = fluent(&expand(&sentence.words));
     }
     all
 }
@@ -144,6 +144,8 @@ fn expand(words: &[Word]) -> Vec<Word> {
         let stem = |stem: &str| Word { text: stem.to_owned(), capital: word.capital };
         if let Some(apart) = contraction(text) {
             out.extend(apart.split(' ').map(small));
+        } else if text == "r" && at > 0 && starts_place_phrase(next) {
+            out.push(small("are"));
         } else if text == "its" && (starts_place_phrase(next) || matches!(next, "the" | "a" | "an")) {
             out.extend(["it", "is"].map(small));
         } else if let Some(verb) = text.strip_suffix("n't") {
@@ -161,6 +163,53 @@ fn expand(words: &[Word]) -> Vec<Word> {
 }
 
 /// After a noun with 's, does this word make it "is" rather than "of"?
+/// Words after which a hesitation is only that: "this is, um, the kitchen". After a name it may take the
+/// name back ("the kitchen, um, the gym"), which is left to the grammar.
+const UNFINISHED: &str = "is are was were the a an in at on to of by this that we you it and here our my your past near behind \
+    down through called from with be like just";
+/// What one says while one seeks a word.
+const HESITATIONS: &str = "um uh er erm uhm hmm eh";
+/// Words that speakers repeat while they seek the next.
+const REPEATED: &str =
+    "the a is are in at on to of we you it this by here and our past near behind down through";
+
+fn among(list: &str, word: &str) -> bool {
+    list.split(' ').any(|w| w == word)
+}
+
+/// Without hesitations and stutters: "this is, um, the the kitchen" is "this is the kitchen".
+fn fluent(words: &[Word]) -> Vec<Word> {
+    let mut out: Vec<Word> = Vec::with_capacity(words.len());
+    let mut at = 0;
+    while let Some(word) = words.get(at) {
+        let text = |i: usize| words.get(i).map_or("", |w| w.text.as_str());
+        let comma = word.text == COMMA;
+        let said = out.last().map_or("", |w| w.text.as_str());
+        let hesitates = among(UNFINISHED, said) && among(HESITATIONS, text(at + usize::from(comma)));
+        if hesitates {
+            at += 1 + usize::from(comma);
+            at += usize::from(text(at) == COMMA);
+            continue;
+        }
+        let repeated = text(at + usize::from(comma));
+        if repeated == said && among(REPEATED, said) {
+            at += 1 + usize::from(comma);
+            continue;
+        }
+        // "This is, this is the kitchen".
+        let pair = at + usize::from(comma);
+        let twice = matches!(out.as_slice(), [.., a, b] if a.text == text(pair) && b.text == text(pair + 1)
+            && among(REPEATED, &b.text) && among("this it we that here there", &a.text));
+        if twice {
+            at = pair + 2;
+            continue;
+        }
+        out.push(word.clone());
+        at += 1;
+    }
+    out
+}
+
 fn starts_place_phrase(word: &str) -> bool {
     const STARTS: &str = "a about above across adjacent after ahead along an around at away behind below beside \
         between beyond by close down downstairs far four in inside just located near next north not on one opposite \

@@ -270,6 +270,32 @@ impl Cursor<'_> {
             "back" | "left" | "right" | "north" | "south" | "east" | "west" if !words.is_empty() => false,
             "north" | "south" | "east" | "west" if next == "of" => false,
             "once" if matches!(next, "more" | "again") => false,
+            // "Another lounge two floors up".
+            _ if !words.is_empty()
+                && counted(word).is_some()
+                && matches!(
+                    next,
+                    "floor"
+                        | "floors"
+                        | "level"
+                        | "levels"
+                        | "flights"
+                        | "flight"
+                        | "story"
+                        | "stories"
+                        | "door"
+                        | "doors"
+                        | "rooms"
+                        | "offices"
+                        | "meters"
+                        | "metres"
+                        | "feet"
+                        | "yards"
+                        | "steps"
+                ) =>
+            {
+                false
+            }
             "smells" | "looks" | "lies" | "sits" | "one" | "ones" if is_place(last) && next.is_empty() => {
                 word == "one"
             }

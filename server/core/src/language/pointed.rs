@@ -7,6 +7,7 @@ use super::cursor::Cursor;
 use super::describe::attribute;
 use super::label::{SPOT, called, named, plausible};
 use super::names::{Kind, Name};
+use super::normalise::COMMA;
 use super::noun_phrase::{Determiner, NounPhrase};
 use super::relate::Related;
 use super::relation::Relation as R;
@@ -15,6 +16,9 @@ use super::relation::Relation as R;
 pub(super) fn pointed(at: &mut Cursor) -> Option<Readings> {
     let spot = at.sees(SPOT);
     let head = subject(at)?;
+    if head == Head::Here && at.eat_each(&["also|", "goes by|is known by", "the name of|the name|"]) {
+        return named(at).filter(|p| spot || plausible(p)).map(|p| called(at, head, p, false));
+    }
     let verb = at.copula()?;
     let head = match head {
         Head::There if verb.past => Head::Previous,
@@ -32,15 +36,43 @@ fn subject(at: &mut Cursor) -> Option<Head> {
     if at.just_left() {
         return Some(Head::Previous);
     }
+    let spot = "place|room|area|space|spot|one|building|hallway|corridor|floor|part of the building";
+    if at.eat_each(&[
+        "the",
+        spot,
+        "that|which|",
+        "we|you|i",
+        "are",
+        "now|currently|just|",
+        "standing|all|",
+        "in|at|entering|looking at",
+        "now|right now|here|currently|",
+    ]) || at.eat_each(&[
+        "the",
+        spot,
+        "where|",
+        "we|you|i",
+        "are",
+        "now|currently|",
+        "standing|",
+        "now|right now|",
+    ]) {
+        return Some(Head::Here);
+    }
     let here = at.eat_any(
         "this thing here|this right here|this here|where we are standing|where we are now|where we are|\
-         the place we are in|the room we are in now|the room we are in|the room you are in|the place where we are|\
-         the room where we are|what you see here",
+         where you are standing|where you are|what you see here",
     );
     if here.is_some() || at.eat_any(SPOT).is_some() {
         return Some(Head::Here);
     }
-    if at.eat_any("that place|that room over there|that room|that one|that over there").is_some() {
+    if at
+        .eat_any(
+            "that back there|that place over there|that place|that room over there|that room|that one over there|that one|\
+        that right there|that over there|that there|those over there|the one over there|the room over there",
+        )
+        .is_some()
+    {
         return Some(Head::There);
     }
     let word = at.eat_any("this|these|right here|here|those|that|it")?;
@@ -54,15 +86,13 @@ fn subject(at: &mut Cursor) -> Option<Head> {
 /// What is said of the place pointed at.
 fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<Readings> {
     let start = *at;
-    if at
-        .eat_any(
-            "what we call|what they call|what people call|what everyone calls|what i call|also called|also known as|\
-             also named|called|known as|named|referred to as|known to everyone as",
-        )
-        .is_some()
-    {
+    if so_called(at) {
         // "This place is called Nirvana"; "this is called teamwork" is less clear.
-        return named(at).filter(|p| spot || plausible(p)).map(|p| called(at, head, p, false));
+        let name = named(at).filter(|p| spot || plausible(p))?;
+        if head == Head::It {
+            return Some(one(Content::Alias { what: Phrase::new(head), also: name.phrase }));
+        }
+        return Some(called(at, head, name, false));
     }
     if let Some(same) = same_place(at, &head) {
         return Some(one(same));
@@ -89,6 +119,22 @@ fn predicate(at: &mut Cursor, head: Head, spot: bool, verb: &Copula) -> Option<R
     }
     *at = start;
     related_predicate(at, head)
+}
+
+/// "What we call", "also known as", "a room that people call": a name follows.
+pub(super) fn so_called(at: &mut Cursor) -> bool {
+    let by = "we|they|people|everyone|everybody|folks|students|i|you";
+    let calls = "call|calls|refer to as|refers to as|know as|knows as|named";
+    let called =
+        "called|known as|named|referred to as|known to everyone as|nicknamed|labeled|labelled|dubbed";
+    let thing =
+        "what|the room|the place|the area|the space|the one|the so called|a room|a place|an area|a space";
+    let often =
+        "all|also|usually|like to|often|commonly|affectionately|generally|sometimes|better|otherwise|";
+    at.eat_each(&[thing, "that|which|", by, often, calls])
+        || at.eat_each(&[thing, "that is|which is|is|", often, called])
+        || at.eat_each(&[often, called])
+        || at.eat("the so called")
 }
 
 fn named_predicate(at: &mut Cursor, head: &Head, again: bool) -> Option<Readings> {
@@ -204,15 +250,21 @@ pub(super) fn same_place(at: &mut Cursor, head: &Head) -> Option<Content> {
 pub(super) fn where_kept(at: &mut Cursor) -> Option<Phrase> {
     at.eat_any("the place where|the room where|where")?;
     let mut place = Phrase::new(Head::Place);
+    let start = *at;
     if at.eat_any("all the|the|all").is_some() || at.at_break() {
         let thing = at.noun_phrase()?;
-        at.eat_any("are kept|is kept|are stored|are|is|live|lives|go|goes")?;
-        place.within.push(Related::to(R::Contains, thing.phrase).restriction());
-        return Some(place);
+        if at.eat_any("are kept|is kept|are stored|is stored|are|is|live|lives|go|goes").is_some() {
+            place.within.push(Related::to(R::Contains, thing.phrase).restriction());
+            return Some(place);
+        }
     }
-    at.eat_any("we|they|you|people|students|everyone|everybody|i|the students|the staff|you can|we all|one")?;
-    at.skip("can|all|usually|always|often|normally|go to|like to|come to|will|sometimes|mostly");
-    if at.eat_any("keep|store|have|put|find|get|stash|leave|hide").is_some() {
+    *at = start;
+    if at.eat_any("we|they|you|people|students|everyone|everybody|i|one").is_none() {
+        people(at)?;
+    }
+    at.skip("can|could|would|should|all|usually|always|often|normally|go to|like to|come to|get to|go|will|sometimes|mostly|\
+        generally|typically");
+    if at.eat_any("keep|store|have|put|find|see|get|stash|leave|hide").is_some() {
         at.skip("all|most of|some of|our|my|their");
         let thing = at.noun_phrase()?;
         let meal = ["lunch", "breakfast", "dinner", "meeting", "coffee", "class", "party"]
@@ -225,13 +277,41 @@ pub(super) fn where_kept(at: &mut Cursor) -> Option<Phrase> {
         place.features.purpose = thing.name().map(|n| format!("have {n}"));
         return at.at_break().then_some(place);
     }
-    let verb = at.eat_any(
-        "eat|drink|meet|work|sleep|cook|park|print|study|relax|rest|hang out|smoke|play|exercise|work out|hold|teach|\
-         have|take|make|wash|wait|gather|sit|read|pick up|drop off",
-    )?;
+    let verb = base_form(at.eat_any(DOING)?);
     let rest = at.take_to_break();
     place.features.purpose = Some([&[verb], rest.as_slice()].concat().join(" "));
     (rest.len() <= 4).then_some(place)
+}
+
+/// "Work" of "works": in the list of verbs it comes next.
+fn base_form(verb: &'static str) -> &'static str {
+    let third_person = verb.split(' ').next().is_some_and(|w| w.ends_with('s'));
+    let next = DOING.split('|').skip_while(|v| *v != verb).nth(1);
+    next.filter(|_| third_person).unwrap_or(verb)
+}
+
+/// What people do at places; the base form of a verb comes after its form in -s.
+const DOING: &str = "eats|eat|drinks|drink|meets|meet|works out|work out|works|work|sleeps|sleep|cooks|cook|parks|park|\
+    prints|print|studies|study|relaxes|relax|rests|rest|hangs out|hang out|smokes|smoke|plays|play|exercises|exercise|\
+    holds|hold|teaches|teach|has|have|takes|take|makes|make|washes|wash|waits|wait|gathers|gather|sits|sit|reads|read|\
+    picks up|pick up|drops off|drop off|checks in|check in|checks out|check out|trains|train|builds|build|tests|test|\
+    practices|practice|registers|register|signs in|sign in|gives|give|runs|run|does|do|recycle|charge|present|repair|\
+    fix|record|rehearse|pray|nap|shower|change|vote|swim|stay|lives|live|line up|queue|order|pay|buy|get together";
+
+/// "The grad students": who does something, before what is done.
+fn people(at: &mut Cursor) -> Option<()> {
+    let someone = at.word().is_some_and(|w| w.capital);
+    if at.eat_any("all the|most of the|the|our|most|all|some|my").is_none() && !someone {
+        return None;
+    }
+    for _ in 0..3 {
+        at.word().filter(|w| w.text != COMMA)?;
+        at.step();
+        if at.sees(DOING) || at.sees("keep|store|put|can|usually|all|often|always|like to|go to|come to") {
+            return Some(());
+        }
+    }
+    None
 }
 
 fn owned_room(owner: Owner) -> Option<Phrase> {

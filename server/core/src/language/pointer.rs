@@ -2,6 +2,7 @@
 
 use super::act::{Head, Phrase};
 use super::cursor::Cursor;
+use super::label::LEFT_BEHIND;
 
 /// The place held, as people point at it.
 const SPOT: &str = "this place here|this place|this room here|this room|this area|this space|this spot|this location|\
@@ -68,12 +69,10 @@ impl Cursor<'_> {
             .is_some();
         if noun {
             self.skip("that|which|where");
-            let left = self.eat_any("we|you|i").is_some()
-                && {
-                    self.skip("have|had|just|all");
-                    self.eat_any("were just in|were just at|were last in|left behind|left|came out of|came from|were in|were at|exited|were|passed through|visited|saw|came through")
-                    .is_some()
-                };
+            let left = self.eat_any("we|you|i").is_some() && {
+                self.skip("have|had|just|all|were just|were last|were|only just");
+                self.eat_any(LEFT_BEHIND).is_some() || self.before() == "were"
+            };
             if left {
                 self.skip("just now|before|earlier|a moment ago|a minute ago|a second ago");
                 return true;

@@ -41,7 +41,7 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ("on the other side of|on the far side of|on the opposite side of|over on the other side of", R::Across),
     (
         "across the hall from|across the hallway from|across the corridor from|across from|opposite from|opposite to|\
-      opposite of|opposite|facing|face to face with",
+      opposite of|opposite|kitty corner from|kitty corner to|catty corner from|catty corner to|facing|face to face with",
         R::AcrossFrom,
     ),
     ("across", R::Across),
@@ -52,13 +52,13 @@ const PREPOSITIONS: [(&str, R); 34] = [
         R::AtEndOf,
     ),
     (
-        "next door to|next to|beside|alongside|adjacent to|adjoining|right up against|side by side with|attached to|off of|off",
+        "next door to|next to|beside|alongside|adjacent to|adjoining|right up against|side by side with|attached to|connected to|joined to|to the side of|at the side of|by the side of|bordering|off of|off",
         R::NextTo,
     ),
     ("away from|far away from|far from|a long way from|well away from", R::AwayFrom),
     (
         "close to|near to|near|close by|in the vicinity of|not far from|not too far from|a short walk from|\
-      a few steps from|just steps from|around the corner from|by",
+      a few steps from|within sight of|a stone's throw from|a short distance from|steps away from|steps from|just steps from|around the corner from|by",
         R::Near,
     ),
     ("along", R::Along),
@@ -80,9 +80,13 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ("to the west of|on the west side of|at the west end of|west of", R::WestOf),
     ("upstairs from", R::LevelUp),
     ("downstairs from", R::LevelDown),
-    ("at the top of|at the bottom of|at the foot of|at the head of|at the corner of|at the base of", R::At),
     (
-        "in the middle of|in the center of|in the centre of|at the center of|at the back of|in the back of|in the corner of",
+        "at the top of|at the bottom of|at the foot of|at the head of|at the corner of|at the base of|at the start of|at the beginning of|at the front of|at the mouth of",
+        R::At,
+    ),
+    (
+        "in the middle of|in the center of|in the centre of|at the center of|at the back of|in the back of|in the corner of|in the far corner of|in the back corner of|\
+      at the far corner of",
         R::In,
     ),
     ("inside of|inside|within|into|in", R::In),
@@ -99,7 +103,7 @@ const PREPOSITIONS: [(&str, R); 34] = [
 /// Says nothing that we use.
 const ADVERBS: &str = "located|situated|found|placed|halfway|partway|midway|all the way|way|back|out|over|up|further|farther|a bit|a little|\
     somewhere|still|also|both|all|tucked away|somewhere over|hidden|immediately adjacent|very|really|pretty|quite|\
-    straight|not far|standing";
+    straight|not far|standing|due|diagonally|kind of|sort of|basically|more or less|set|sitting|positioned|housed";
 
 impl Cursor<'_> {
     /// Reads how something lies; none, and the position unchanged, if nothing says so here.
@@ -139,6 +143,13 @@ impl Cursor<'_> {
     fn modified(&mut self) -> Option<Related> {
         let mut modifiers = Modifiers::default();
         loop {
+            let down_in = self.peek(0) != "out"
+                && matches!(self.peek(0), "down" | "up" | "over" | "back" | "out")
+                && matches!(self.peek(1), "in" | "on" | "at" | "by" | "near" | "behind" | "under" | "next");
+            if down_in {
+                self.step();
+                continue;
+            }
             if self.sees("right of|up the|over the|out of|up here") {
                 break;
             }
@@ -233,7 +244,7 @@ impl Cursor<'_> {
         let definite = matches!(read.determiner, Determiner::Definite | Determiner::Demonstrative);
         let fits = match read.kind {
             Kind::Place => true,
-            Kind::Thing => !matches!(read.determiner, Determiner::None | Determiner::Demonstrative),
+            Kind::Thing => read.determiner != Determiner::None,
             Kind::Open => definite,
             Kind::Vague if read.name().is_some_and(|n| n.as_str() == "building") => definite,
             Kind::Vague => definite && (read.is_told() || read.determiner == Determiner::Demonstrative),

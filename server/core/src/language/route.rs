@@ -7,6 +7,8 @@ use super::build::Readings;
 use super::cursor::Cursor;
 use super::locate::locate_clause;
 use super::notation::{phrase_notation, relation_notation};
+use super::relate::Related;
+use super::relation::Relation as R;
 
 /// Steps of one route that are read.
 const STEPS_MAX: usize = 24;
@@ -155,7 +157,12 @@ fn go(at: &mut Cursor) -> Option<String> {
             *at = before;
             break;
         }
-        let Some(related) = at.related() else {
+        // "Go past the gym, through the doors".
+        let listed = !said.is_empty() && at.eat_any(", then|, and|,|then").is_some();
+        let onward = |r: &Related| {
+            matches!(r.relation, R::Through | R::Past | R::Down | R::Along | R::Across | R::Around | R::OutOf)
+        };
+        let Some(related) = at.related().filter(|r| !listed || onward(r) && !at.sees("is|are")) else {
             *at = before;
             break;
         };
@@ -176,6 +183,10 @@ fn visit(at: &mut Cursor) -> Option<String> {
     let verb =
         at.eat_any("follow|enter|exit|leave|pass|cross|take|stop at|stop in|wait in|wait at|use|climb")?;
     let (landmark, _) = at.landmark()?;
+    if matches!(landmark.head, Head::Speaker | Head::Agent | Head::It) {
+        // "Follow me" is an order.
+        return None;
+    }
     let verb = verb.split(' ').next().unwrap_or(verb);
     let mut said = format!("{verb} {}", phrase_notation(&landmark));
     if let Some(way) = at.eat_any("upstairs|downstairs|up|down") {

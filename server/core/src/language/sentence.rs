@@ -2,7 +2,7 @@
 //! it is read: one unread word and it says nothing to us, since half a sentence may say the opposite of
 //! the whole.
 
-use super::act::{About, Content, Question, Reason, Sameness};
+use super::act::{About, Content, Head, Question, Reason, Sameness};
 use super::aside::{idiom, order};
 use super::ask::ask_clause;
 use super::build::{Readings, negate, one};
@@ -19,7 +19,8 @@ pub(super) const FILLERS: &str = ",|and|so|ok|okay|now|um|uh|er|erm|hmm|well|alr
     then|also|next ,|finally|anyway|please|look|listen|as you can see|as you see|you see|you know|by the way|\
     excuse me|at last|robot|everyone|everybody|ladies and gentlemen|folks|guys|good ,|great ,|right ,|like|but|\
     remember that|remember|note that|notice that|i know that|i know|i am sure that|i am sure|in this building|\
-    on this floor ,|let us see|as i said|like i said|as we said|as i told you|of course|turns out|it turns out that|\
+    on this floor ,|let us see|as i said|like i said|as we said|as i told you|of course|turns out|it turns out that|as you come in|as you walk in|as you enter ,|when you come in|when you walk in|if you come in|\
+    from here|from where we are|earlier|before|\
     it turns out|see|and here|if you look|that said";
 /// Said after a clause; changes nothing (a map is one level).
 pub(super) const TAGS: &str = "now|right now|here|right here|over here|today|too|as well|also|then|everyone|everybody|guys|\
@@ -78,6 +79,11 @@ fn clauses(sentence: &Sentence, mut marked: bool) -> Option<(Vec<Readings>, bool
             next = mend(&mut at, last);
         }
         let mut readings = next?;
+        // At the end of a way one is not here.
+        let led = matches!(last, Some(Content::Route { .. }));
+        if led && readings.first().iter().any(is_here) {
+            return None;
+        }
         finish(&mut at, &mut readings, &mut lead)?;
         // What says itself what it corrects needs no mark.
         marked &= !readings.first().iter().any(|c| matches!(c, Content::Correct { .. }));
@@ -95,6 +101,15 @@ fn clauses(sentence: &Sentence, mut marked: bool) -> Option<(Vec<Readings>, bool
 }
 
 /// A correction may follow without a pause: "this is the kitchen not the gym".
+/// Does it say what or where the place held is?
+fn is_here(said: &Content) -> bool {
+    match said {
+        Content::Label { at, .. } => at.head == Head::Here,
+        Content::Locate(locate) => locate.figure.head == Head::Here,
+        _ => false,
+    }
+}
+
 fn mends(at: &Cursor) -> bool {
     at.sees("not|no|sorry|i mean|or rather|rather|make that")
 }
@@ -121,7 +136,14 @@ struct Lead {
 impl Lead {
     fn read(&mut self, at: &mut Cursor) {
         loop {
-            if at.sees("everyone calls|everybody calls") {
+            // "Everyone calls it …", "folks here call it …" are subjects.
+            let group = matches!(at.peek(0), "everyone" | "everybody" | "folks");
+            if group
+                && matches!(
+                    at.peek(1),
+                    "calls" | "call" | "just" | "also" | "here" | "around" | "usually" | "refers" | "knows"
+                )
+            {
                 return;
             }
             if at.eat_any(AGAIN).is_some() {
