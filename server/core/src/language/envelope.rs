@@ -17,12 +17,22 @@ const END: f64 = 3.9;
 pub struct Envelope {
     footprint: Footprint,
     scale_m: f64,
+    /// Radius, squared, of a circle round all that is not negligible.
+    round_m2: f64,
 }
 
 impl Envelope {
     /// Round `footprint`, falling off with `scale_m`.
     pub fn new(footprint: Footprint, scale_m: f64) -> Self {
-        Self { footprint, scale_m }
+        let Footprint { half_length_m: a, half_width_m: b, .. } = footprint;
+        let round_m2 = ((a * a + b * b).sqrt() + END * scale_m).powi(2);
+        Self { footprint, scale_m, round_m2 }
+    }
+
+    /// Zero at a point, as a glance tells: most of a map is far from a landmark.
+    pub fn is_far(&self, at: (f64, f64)) -> bool {
+        let (dx, dy) = (at.0 - self.footprint.x_m, at.1 - self.footprint.y_m);
+        dx * dx + dy * dy > self.round_m2
     }
 
     /// At a gap from the footprint, 1 at its edge; zero where it is negligible.

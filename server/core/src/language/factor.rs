@@ -9,9 +9,9 @@ use super::act::Frame;
 use super::clause::Narrowing;
 use super::envelope::Envelope;
 use super::footprint::Footprint;
-use super::ground::GroundPlace;
-use super::path_factors::{approach_m, from_near, path_factor};
+use super::path_factors::PathFactor;
 use super::scene::{Scene, unit};
+use super::ways::Step;
 
 /// "Just past": so much closer.
 const JUST: f64 = 0.4;
@@ -52,19 +52,11 @@ enum Shape {
     /// Anything.
     Anywhere,
     /// A learned relation of the path there.
-    Path(Relation),
+    Path(PathFactor),
     /// A direction from a point: unit vector, concentration.
     Cone((f64, f64), (f64, f64), f64),
     /// A side of the footprint's axis (1 left, −1 right of `along`), ahead of `from_m` on it.
     Side { along: (f64, f64), side: f64, from_m: f64 },
-}
-
-/// A point that is asked for.
-struct Spot {
-    at: (f64, f64),
-    /// Length of the way there from the speaker, and a point by which one sets off.
-    walk_m: f64,
-    onset: (f64, f64),
 }
 
 /// A factor, ready to be asked for any point.
@@ -74,8 +66,6 @@ pub struct Factor<'a> {
     envelope: Envelope,
     shape: Shape,
     distance: Option<Distance>,
-    /// For path relations: where the way to each place first comes near the landmark.
-    first_near: Vec<u32>,
     /// One over the integral of envelope times score.
     scale_per_m2: f64,
 }
@@ -107,7 +97,6 @@ impl<'a> Factor<'a> {
         frame: Frame,
         narrowing: Narrowing,
         target: Target,
-        path: &mut Vec<(f64, f64)>,
     ) -> Option<Self> {
         let (footprint, shape) = shape(scene, relation, frame, target)?;
         let from = match shape {
@@ -122,103 +111,105 @@ impl<'a> Factor<'a> {
             scale_m = scale_m.max(d.mean_m);
         }
         let envelope = Envelope::new(footprint, scale_m);
-        let first_near = match shape {
-            Shape::Path(relation) => {
-                let over_m = |p: &GroundPlace| {
-                    footprint.signed_distance_m(footprint.local(p.x_m, p.y_m)) - approach_m(relation)
-                };
-                scene.ways.first_near(scene.places, over_m)
-            }
-            _ => Vec::new(),
-        };
-        let mut factor = Self { scene, footprint, envelope, shape, distance, first_near, scale_per_m2: 0.0 };
-        let mean = factor.envelope.mean(|at| factor.score(&factor.straight(at, path), path));
+        let mut factor = Self { scene, footprint, envelope, shape, distance, scale_per_m2: 0.0 };
+        let mean =
+            factor.envelope.mean(|at| factor.score(at) * factor.distance_score(at, || scene.straight_m(at)));
         factor.scale_per_m2 = 1.0 / (factor.envelope.area_m2() * mean.max(MEAN_MIN));
         Some(factor)
     }
 
-    /// Density of the figure at a place, per m²; `path` is scratch.
-    pub fn density(&self, place: usize, path: &mut Vec<(f64, f64)>) -> f64 {
+    /// Adds to every place's sum `weight` times the density of the figure there, per m².
+    pub fn add_densities(&self, weight: f64, sums: &mut [f64]) {
+        let Shape::Path(path) = &self.shape else {
+            for (place, sum) in sums.iter_mut().enumerate() {
+                *sum += weight * self.density(place, |at| self.score(at));
+            }
+            return;
+        };
+        let ways = self.scene.ways();
+        for (place, sum) in sums.iter_mut().enumerate() {
+            // As the crow flies, where no way is known.
+            if ways.walk_m(place).is_none() {
+                *sum += weight * self.density(place, |at| self.score(at));
+            }
+        }
+        // Of each step on the way: where the way first came near the landmark, with the number of steps
+        // up to there, or how far before that it still is.
+        let mut trail: Vec<Result<(Step, usize), f64>> = Vec::new();
+        ways.visit(self.scene.places, |place, way| {
+            let Some((&here, before)) = way.split_last() else { return };
+            trail.truncate(before.len());
+            let state = match (before.last(), trail.last()) {
+                (_, Some(&Ok(start))) => Ok(start),
+                (Some(&last), Some(&Err(last_m))) => {
+                    let here_m = path.before_m(here.at);
+                    path.start(last, last_m, here, here_m).map(|start| (start, before.len())).ok_or(here_m)
+                }
+                _ => Err(path.before_m(here.at)),
+            };
+            trail.push(state);
+            // What never comes near a landmark does not lead past it.
+            if let Ok((start, steps)) = state {
+                let onset = self.scene.at(ways.onset(place));
+                let score = |_| path.p(start, &way[steps..]) * self.onward(onset);
+                sums[place] += weight * self.density(place, score);
+            }
+        });
+    }
+
+    /// Density at a place, given how well it fits but for a distance said, 0…1.
+    fn density(&self, place: usize, score: impl FnOnce((f64, f64)) -> f64) -> f64 {
         let at = self.scene.at(place);
-        if self.falloff(at) <= 0.0 {
+        if self.envelope.is_far(at) {
             return 0.0;
         }
-        let Some(walk_m) = self.scene.ways.walk_m(place) else {
-            let spot = self.straight(at, path);
-            return self.density_at(&spot, path);
-        };
-        let first = self.first_near.get(place).copied();
-        if let Some(first) = first {
-            self.scene.ways.path(self.scene.places, first, place, path);
+        let falloff = self.envelope.at_gap(self.gap_m(at));
+        if falloff <= 0.0 {
+            return 0.0;
         }
-        let onset = self.scene.at(self.scene.ways.onset(place));
-        self.density_at(&Spot { at, walk_m, onset }, path)
-    }
-
-    /// A point that is reached in a straight line, which is put into `path`.
-    fn straight(&self, at: (f64, f64), path: &mut Vec<(f64, f64)>) -> Spot {
-        let stand = self.scene.stand();
-        path.clear();
-        path.extend([stand, at]);
-        Spot { at, walk_m: (at.0 - stand.0).hypot(at.1 - stand.1), onset: at }
-    }
-
-    /// Density at a point, reached on a path, which is spent.
-    fn density_at(&self, spot: &Spot, path: &mut Vec<(f64, f64)>) -> f64 {
-        let density = self.falloff(spot.at) * self.score(spot, path) * self.scale_per_m2;
+        let distance = self.distance_score(at, || self.scene.walk_m(place));
+        let density = falloff * distance * score(at) * self.scale_per_m2;
         if density.is_finite() { density } else { 0.0 }
-    }
-
-    fn falloff(&self, at: (f64, f64)) -> f64 {
-        self.envelope.at_gap(self.gap_m(at))
     }
 
     fn gap_m(&self, at: (f64, f64)) -> f64 {
         self.footprint.signed_distance_m(self.footprint.local(at.0, at.1)).max(0.0)
     }
 
-    /// How well a point at the end of a path fits, 0…1.
-    fn score(&self, spot: &Spot, path: &mut Vec<(f64, f64)>) -> f64 {
-        let at = spot.at;
-        self.distance_score(spot)
-            * match self.shape {
-                Shape::Anywhere => 1.0,
-                Shape::Beside => f64::from(self.gap_m(at) > 0.0),
-                Shape::Path(relation) => {
-                    // What never comes near a landmark does not lead past it.
-                    if from_near(path, &self.footprint, approach_m(relation)) {
-                        path_factor(relation, path, &self.footprint).unwrap_or(0.0) * self.onward(spot)
-                    } else {
-                        0.0
-                    }
-                }
-                Shape::Cone(from, to, kappa) => {
-                    let cos = unit(at, from).map_or(0.0, |d| d.0 * to.0 + d.1 * to.1);
-                    (kappa * (cos - 1.0)).exp()
-                }
-                Shape::Side { along, side, from_m } => {
-                    let (dx, dy) = (at.0 - self.footprint.x_m, at.1 - self.footprint.y_m);
-                    let (u, v) = (dx * along.0 + dy * along.1, dy * along.0 - dx * along.1);
-                    let ahead = if u > from_m - SIDE_M { AHEAD } else { 1.0 - AHEAD };
-                    ahead / (1.0 + (-(side * v - SIDE_M) / (0.25 * SIDE_M)).exp())
-                }
+    /// How well a point fits but for a distance said, 0…1; a path there is straight.
+    fn score(&self, at: (f64, f64)) -> f64 {
+        match &self.shape {
+            Shape::Anywhere => 1.0,
+            Shape::Beside => f64::from(self.gap_m(at) > 0.0),
+            Shape::Path(path) => path.p_straight(self.scene.stand(), at) * self.onward(at),
+            &Shape::Cone(from, to, kappa) => {
+                let cos = unit(at, from).map_or(0.0, |d| d.0 * to.0 + d.1 * to.1);
+                (kappa * (cos - 1.0)).exp()
             }
+            &Shape::Side { along, side, from_m } => {
+                let (dx, dy) = (at.0 - self.footprint.x_m, at.1 - self.footprint.y_m);
+                let (u, v) = (dx * along.0 + dy * along.1, dy * along.0 - dx * along.1);
+                let ahead = if u > from_m - SIDE_M { AHEAD } else { 1.0 - AHEAD };
+                ahead / (1.0 + (-(side * v - SIDE_M) / (0.25 * SIDE_M)).exp())
+            }
+        }
     }
 
-    /// How a way sets off: ahead, or back where the speaker came from.
-    fn onward(&self, spot: &Spot) -> f64 {
+    /// How a way sets off to a point: ahead, or back where the speaker came from.
+    fn onward(&self, onset: (f64, f64)) -> f64 {
         let ahead = self.scene.ahead;
-        let cos = unit(spot.onset, self.scene.stand()).map_or(0.0, |d| d.0 * ahead.0 + d.1 * ahead.1);
+        let cos = unit(onset, self.scene.stand()).map_or(0.0, |d| d.0 * ahead.0 + d.1 * ahead.1);
         1.0 - AHEAD + (2.0 * AHEAD - 1.0) * 0.5 * (1.0 + cos)
     }
 
-    fn distance_score(&self, spot: &Spot) -> f64 {
+    /// How well a point fits a distance said; `walk_m` is the way there from the speaker.
+    fn distance_score(&self, at: (f64, f64), walk_m: impl FnOnce() -> f64) -> f64 {
         let Some(said) = self.distance else { return 1.0 };
-        let (at, stand) = (spot.at, self.scene.stand());
+        let stand = self.scene.stand();
         let is_m = match said.from {
             From::Landmark => (at.0 - self.footprint.x_m).hypot(at.1 - self.footprint.y_m),
             From::Along(d) => (at.0 - stand.0) * d.0 + (at.1 - stand.1) * d.1,
-            From::Walk => spot.walk_m,
+            From::Walk => walk_m(),
         };
         (-0.5 * ((is_m - said.mean_m) / said.sigma_m).powi(2)).exp()
     }
@@ -265,7 +256,7 @@ fn shape(scene: &Scene, relation: Relation, frame: Frame, target: Target) -> Opt
         | R::Towards
         | R::AwayFrom
         | R::Around
-        | R::OutOf => (floor, Shape::Path(relation)),
+        | R::OutOf => (floor, Shape::Path(PathFactor::new(relation, floor)?)),
         // What is near a room is near its door.
         R::Near => match scene.room(target.place) {
             Some(room) => (Footprint::spot(room.hinge.0, room.hinge.1, 1.5), Shape::Anywhere),

@@ -107,18 +107,16 @@ fn clause_density(readings: &[Reading], places: &[GroundPlace], speaker: usize) 
     kept.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     kept.truncate(MAX_READINGS);
     let scale = 1.0 / kept.iter().map(|r| r.weight).sum::<f64>().max(1.0);
-    let (mut path, mut of_reading) = (Vec::new(), Vec::new());
+    let mut of_reading = Vec::new();
     for reading in kept {
         let targets = targets(&scene, reading.landmarks);
         of_reading.clear();
         of_reading.resize(places.len(), 0.0);
         for &(target, p) in &targets {
             for (frame, share) in frames(reading) {
-                let narrowing = reading.narrowing;
-                let factor = Factor::new(&scene, reading.relation, frame, narrowing, target, &mut path);
-                let Some(factor) = factor else { continue };
-                for (k, sum) in of_reading.iter_mut().enumerate() {
-                    *sum += p * share * factor.density(k, &mut path);
+                let factor = Factor::new(&scene, reading.relation, frame, reading.narrowing, target);
+                if let Some(factor) = factor {
+                    factor.add_densities(p * share, &mut of_reading);
                 }
             }
         }

@@ -4,6 +4,7 @@
 use super::footprint::Footprint;
 use super::ground::GroundPlace;
 use super::ways::Ways;
+use std::cell::OnceCell;
 
 /// The approach whose direction is "ahead".
 const APPROACH_M: f64 = 2.0;
@@ -30,8 +31,8 @@ const ENTRY_COS: f64 = 0.64;
 pub struct Scene<'a> {
     /// All places.
     pub places: &'a [GroundPlace],
-    /// Ways from the speaker.
-    pub ways: Ways,
+    /// Ways from the speaker, once they are asked for: most relations don't.
+    ways: OnceCell<Ways>,
     /// The speaker's place.
     pub speaker: usize,
     /// Unit vector of the approach.
@@ -54,7 +55,22 @@ impl<'a> Scene<'a> {
     pub fn new(places: &'a [GroundPlace], speaker: usize) -> Option<Self> {
         let here = places.get(speaker)?;
         let ahead = heading(places, speaker).unwrap_or((here.yaw_rad.cos(), here.yaw_rad.sin()));
-        Some(Self { places, ways: Ways::new(places, speaker), speaker, ahead })
+        Some(Self { places, ways: OnceCell::new(), speaker, ahead })
+    }
+
+    /// Ways from the speaker.
+    pub fn ways(&self) -> &Ways {
+        self.ways.get_or_init(|| Ways::new(self.places, self.speaker))
+    }
+
+    /// Length of the way from the speaker to a place; straight, where none is known.
+    pub fn walk_m(&self, place: usize) -> f64 {
+        self.ways().walk_m(place).unwrap_or_else(|| self.straight_m(self.at(place)))
+    }
+
+    /// From the speaker straight to a point.
+    pub fn straight_m(&self, at: (f64, f64)) -> f64 {
+        (at.0 - self.stand().0).hypot(at.1 - self.stand().1)
     }
 
     /// Where the speaker stands.
@@ -191,6 +207,6 @@ fn heading(places: &[GroundPlace], place: usize) -> Option<(f64, f64)> {
 /// Unit vector to `a` from `b`; none if they are one point.
 pub fn unit(a: (f64, f64), b: (f64, f64)) -> Option<(f64, f64)> {
     let (dx, dy) = (a.0 - b.0, a.1 - b.1);
-    let length_m = dx.hypot(dy);
+    let length_m = (dx * dx + dy * dy).sqrt();
     (length_m.is_finite() && length_m > 0.1).then(|| (dx / length_m, dy / length_m))
 }
