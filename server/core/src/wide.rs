@@ -1,4 +1,9 @@
 //! Loops in the widest registers that the processor has.
+//!
+//! Nothing is computed otherwise than in narrow ones: no sum is reordered, no product fused by that.
+
+// Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
+#![allow(clippy::inline_always)]
 
 use pulp::{Arch, Simd, WithSimd};
 

@@ -1,5 +1,8 @@
 //! How a path lies to a landmark, as numbers: what the factors of path relations are learned on.
 
+// Inlined, loops over points run in wide registers. Indices, since iterators' closures are calls.
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
+
 use super::footprint::Footprint;
 use super::ways::Step;
 use crate::wide::wide;
@@ -7,6 +10,8 @@ use std::f64::consts::{PI, TAU};
 
 /// Numbers that describe a path beside a landmark.
 pub const FEATURES: usize = 36;
+/// The one that is zero if the path comes into the landmark.
+pub(super) const GAP_MIN: usize = 5;
 /// Points, equally far apart on the path, that it is seen by.
 const SAMPLES: usize = 12;
 /// Where ratios are cut: a path that much longer than the landmark is simply long, and few examples
@@ -15,10 +20,10 @@ const RATIO_MAX: f64 = 1.2;
 const LOG_RANGE: (f64, f64) = (-2.0, 2.5);
 const TURNS_MAX: f64 = 1.5;
 
-/// A path seen at equal steps, in the landmark's frame: coordinates along and across it.
+/// A path seen at equal steps, in the landmark's frame: coordinates along and across it, metres.
 struct Samples {
-    along_m: [f64; SAMPLES],
-    across_m: [f64; SAMPLES],
+    along: [f64; SAMPLES],
+    across: [f64; SAMPLES],
     length_m: f64,
 }
 
@@ -30,11 +35,11 @@ impl Samples {
         if !(length_m.is_finite() && start.at.0.is_finite() && start.at.1.is_finite()) {
             return None;
         }
-        let mut samples = Self { along_m: [0.0; SAMPLES], across_m: [0.0; SAMPLES], length_m };
+        let mut samples = Self { along: [0.0; SAMPLES], across: [0.0; SAMPLES], length_m };
         for s in 0..SAMPLES {
             let share = s as f64 / (SAMPLES - 1) as f64;
             let (x_m, y_m) = point_at(start, rest, share * length_m, (share * rest.len() as f64) as usize);
-            (samples.along_m[s], samples.across_m[s]) = landmark.local(x_m, y_m);
+            (samples.along[s], samples.across[s]) = landmark.local(x_m, y_m);
         }
         samples.length_m = length_m.max(1e-3);
         Some(samples)
@@ -42,7 +47,7 @@ impl Samples {
 
     #[inline(always)]
     fn at(&self, k: usize) -> (f64, f64) {
-        (self.along_m[k], self.across_m[k])
+        (self.along[k], self.across[k])
     }
 }
 
@@ -80,7 +85,7 @@ struct Totals {
 impl Totals {
     #[inline(always)]
     fn new(path: &Samples, landmark: &Footprint) -> Self {
-        let (u, v) = (&path.along_m, &path.across_m);
+        let (u, v) = (&path.along, &path.across);
         let (a, b) = (landmark.half_length_m, landmark.half_width_m);
         let (mut gap_m, mut centre_m2, mut across_m) = ([0.0; SAMPLES], [0.0; SAMPLES], [0.0; SAMPLES]);
         let (mut inside, mut within_a, mut within_b) = ([0.0; SAMPLES], [0.0; SAMPLES], [0.0; SAMPLES]);
@@ -164,8 +169,8 @@ fn round_rad(u: &[f64; SAMPLES], v: &[f64; SAMPLES]) -> f64 {
         let leftward = u[k] * v[k + 1] - v[k] * u[k + 1];
         let (was_left, is_left) = (off_m2[k] >= 0.0, off_m2[k + 1] >= 0.0);
         // From left to right against the clock, or the other way round: behind the middle.
-        let left = f64::from(was_left & !is_left & (leftward > 0.0));
-        turns[k] = left - f64::from(!was_left & is_left & (leftward < 0.0));
+        let left = f64::from(was_left && !is_left && leftward > 0.0);
+        turns[k] = left - f64::from(!was_left && is_left && leftward < 0.0);
     }
     let last = SAMPLES - 1;
     angle(off_m2[last], u[0] * u[last] + v[0] * v[last]) + TAU * sum(&turns)

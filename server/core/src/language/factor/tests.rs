@@ -11,7 +11,7 @@ fn drive() -> Vec<GroundPlace> {
 fn factors_integrate_to_at_most_one() {
     let places = drive();
     for (speaker, place) in [(4, 17), (20, 8), (26, 26)] {
-        let scene = Scene::new(&places, speaker).unwrap();
+        let scene = Scene::new(&places, speaker, Scales::FITTED).unwrap();
         for &relation in Relation::ALL {
             for (way, frame) in [(false, Frame::Hearer), (true, Frame::Intrinsic), (false, Frame::Path)] {
                 let target = Target { place, way, other: Some(3) };
@@ -38,7 +38,7 @@ fn factors_integrate_to_at_most_one() {
 #[test]
 fn other_floors_are_not_this_one() {
     let places = drive();
-    let scene = Scene::new(&places, 4).unwrap();
+    let scene = Scene::new(&places, 4, Scales::FITTED).unwrap();
     let target = Target { place: 8, way: false, other: None };
     for relation in [Relation::Above, Relation::LevelDown] {
         let narrowing = Narrowing::default();
@@ -79,7 +79,7 @@ proptest! {
     ) {
         let places = walk(&corners);
         prop_assume!(speaker.max(place).max(other) < places.len());
-        let scene = Scene::new(&places, speaker).unwrap();
+        let scene = Scene::new(&places, speaker, Scales::FITTED).unwrap();
         let target = Target { place, way, other: Some(other) };
         let narrowing = Narrowing { just, distance_m, doors: None };
         if let Some(factor) = Factor::new(&scene, Relation::ALL[kind], Frame::Hearer, narrowing, target) {
