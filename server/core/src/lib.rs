@@ -42,6 +42,7 @@ pub mod snapshot;
 mod take_in;
 pub mod trajectory;
 pub mod weigh;
+mod wide;
 
 pub use config::Config;
 pub use effects::{Effect, Effects};

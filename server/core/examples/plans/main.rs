@@ -3,6 +3,7 @@
 //! ```sh
 //! cargo run --release -p toponym-core --example plans -- kth/            # the half of the buildings
 //! cargo run --release -p toponym-core --example plans -- kth/ --fit      # that scales were chosen on
+//! cargo run --release -p toponym-core --example plans -- kth/ --choose   # chooses and prints them
 //! ```
 //! A robot drives each straight hallway and visits its rooms. Statements that are true by the plan's
 //! walls and doors (`statements.rs`) are grounded on the places driven. Counted is the mass on the
@@ -13,6 +14,7 @@
 //! Beside it the paper's rule, σ(−d/30 m) for every relation.
 #![allow(clippy::unwrap_used, reason = "a tool: a wrong file ends it")]
 
+mod choose;
 mod plan;
 mod statements;
 mod tour;
@@ -24,7 +26,7 @@ use rand_chacha::ChaCha8Rng;
 use statements::{Speaker, Statement};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use toponym_core::language::{LandmarkBelief, Reading, Relation, ground_clause};
+use toponym_core::language::{LandmarkBelief, Reading, Relation, Scales, ground_with};
 use tour::Tour;
 
 /// No landmark and kind of statement tells more than this per hallway: all count alike.
@@ -43,6 +45,9 @@ struct Args {
     /// Speak of rooms not visited yet, ground when they have been.
     #[arg(long)]
     later: bool,
+    /// Choose scales on those buildings and print them.
+    #[arg(long)]
+    choose: bool,
 }
 
 /// What one statement got: mass and hit by factors, the same by the paper's rule, and what went to
@@ -55,18 +60,10 @@ struct Outcome {
 
 fn main() {
     let args = Args::parse();
-    let mut buildings: Vec<PathBuf> =
-        std::fs::read_dir(&args.plans).unwrap().map(|e| e.unwrap().path()).collect();
-    buildings.sort();
-    let (mut outcomes, mut halls) = (BTreeMap::<&str, Vec<Outcome>>::new(), 0);
-    for building in buildings.iter().skip(usize::from(!args.fit)).step_by(2) {
-        for file in files(building) {
-            for hall in plan::hallways(&std::fs::read_to_string(file).unwrap()) {
-                measure(&hall, halls, args.later, &mut outcomes);
-                halls += 1;
-            }
-        }
+    if args.choose {
+        return choose::choose(&args.plans);
     }
+    let (outcomes, halls) = outcomes(&args.plans, args.fit, args.later, &Scales::FITTED);
     println!("{halls} hallways; mass: median on the right rooms; top: share with a right room likeliest");
     println!(
         "{:<17} {:>5}  {:>6} {:>6}  {:>6} {:>6}  {:>9}",
@@ -77,6 +74,24 @@ fn main() {
     }
     let all: Vec<Outcome> = outcomes.into_values().flatten().collect();
     print("all", &all);
+}
+
+type Outcomes = BTreeMap<&'static str, Vec<Outcome>>;
+
+/// Of all statements, by kind, in one half of the buildings; and how many hallways these have.
+fn outcomes(plans: &Path, fit: bool, later: bool, scales: &Scales) -> (Outcomes, usize) {
+    let mut buildings: Vec<PathBuf> = std::fs::read_dir(plans).unwrap().map(|e| e.unwrap().path()).collect();
+    buildings.sort();
+    let (mut outcomes, mut halls) = (Outcomes::new(), 0);
+    for building in buildings.iter().skip(usize::from(!fit)).step_by(2) {
+        for file in files(building) {
+            for hall in plan::hallways(&std::fs::read_to_string(file).unwrap()) {
+                measure(&hall, halls, later, scales, &mut outcomes);
+                halls += 1;
+            }
+        }
+    }
+    (outcomes, halls)
 }
 
 fn files(folder: &Path) -> Vec<PathBuf> {
@@ -114,7 +129,7 @@ fn print(kind: &str, of: &[Outcome]) {
 }
 
 /// Makes statements in a hallway and grounds them.
-fn measure(hall: &Hallway, seed: usize, later: bool, outcomes: &mut BTreeMap<&'static str, Vec<Outcome>>) {
+fn measure(hall: &Hallway, seed: usize, later: bool, scales: &Scales, outcomes: &mut Outcomes) {
     let mut random = ChaCha8Rng::seed_from_u64(seed as u64);
     let now: Vec<bool> = hall.rooms.iter().map(|_| !later || random.random()).collect();
     let tour = Tour::new(hall, |k| now[k]);
@@ -137,14 +152,14 @@ fn measure(hall: &Hallway, seed: usize, later: bool, outcomes: &mut BTreeMap<&'s
         let some: Vec<&(usize, Statement)> = said.sample(&mut random, PER_KIND).collect();
         for (stand, statement) in some {
             let known = if later { tour.at_first_visit(*stand, statement) } else { Some(tour.clone()) };
-            let outcome = known.and_then(|tour| judge(hall, &tour, *stand, statement));
+            let outcome = known.and_then(|tour| judge(hall, &tour, *stand, statement, scales));
             outcomes.entry(kind).or_default().extend(outcome);
         }
     }
 }
 
 /// Grounds a statement; none if its landmarks or figures were not driven to.
-fn judge(hall: &Hallway, tour: &Tour, stand: usize, said: &Statement) -> Option<Outcome> {
+fn judge(hall: &Hallway, tour: &Tour, stand: usize, said: &Statement, scales: &Scales) -> Option<Outcome> {
     let spots: Option<Vec<usize>> = said.landmarks.iter().map(|&l| tour.landmark(hall, l)).collect();
     let mut spots: Vec<[(usize, f64); 1]> = spots?.into_iter().map(|k| [(k, 1.0)]).collect();
     let way = spots.is_empty() && !matches!(said.relation, Relation::LeftOf | Relation::RightOf);
@@ -154,7 +169,7 @@ fn judge(hall: &Hallway, tour: &Tour, stand: usize, said: &Statement) -> Option<
     let landmarks: Vec<LandmarkBelief> = spots.iter().map(|s| LandmarkBelief { places: s, way }).collect();
     let (relation, frame, narrowing) = (said.relation, said.frame, said.narrowing);
     let reading = Reading { weight: 1.0, relation, frame, narrowing, landmarks: &landmarks };
-    let grounded = ground_clause(&[reading], &tour.places, stand, &[]);
+    let grounded = ground_with(scales, &[reading], &tour.places, stand, &[]);
     let ours = in_rooms(hall, tour, &grounded.p);
     let landmark = tour.places[spots[0][0].0];
     let paper: Vec<f64> = tour

@@ -7,8 +7,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Gaps sampled, in scales: middles of equal quarters of exp(−gap/scale) up to the end, the last one's mean.
 const GAPS: [f64; 4] = [0.13, 0.46, 0.95, 2.1];
-/// Samples round the footprint, for each gap, and in it, along and across.
-const ROUND: usize = 12;
+/// Samples in the footprint, along and across.
 const INSIDE: (usize, usize) = (12, 1);
 /// Beyond so many scales there is nothing: 2 % of what is at the edge.
 const END: f64 = 3.9;
@@ -17,12 +16,22 @@ const END: f64 = 3.9;
 pub struct Envelope {
     footprint: Footprint,
     scale_m: f64,
+    /// Radius, squared, of a circle round all that is not negligible.
+    round_m2: f64,
 }
 
 impl Envelope {
     /// Round `footprint`, falling off with `scale_m`.
     pub fn new(footprint: Footprint, scale_m: f64) -> Self {
-        Self { footprint, scale_m }
+        let Footprint { half_length_m: a, half_width_m: b, .. } = footprint;
+        let round_m2 = ((a * a + b * b).sqrt() + END * scale_m).powi(2);
+        Self { footprint, scale_m, round_m2 }
+    }
+
+    /// Zero at a point, as a glance tells: most of a map is far from a landmark.
+    pub fn is_far(&self, at: (f64, f64)) -> bool {
+        let (dx, dy) = (at.0 - self.footprint.x_m, at.1 - self.footprint.y_m);
+        dx * dx + dy * dy > self.round_m2
     }
 
     /// At a gap from the footprint, 1 at its edge; zero where it is negligible.
@@ -42,8 +51,9 @@ impl Envelope {
         4.0 * (self.footprint.half_length_m + self.footprint.half_width_m)
     }
 
-    /// Mean of `score` over the floor, weighed by the envelope.
-    pub fn mean(&self, mut score: impl FnMut((f64, f64)) -> f64) -> f64 {
+    /// Mean of `score` over the floor, weighed by the envelope; by so many samples `round` the footprint
+    /// at each of [`GAPS`].
+    pub fn mean(&self, round: usize, mut score: impl FnMut((f64, f64)) -> f64) -> f64 {
         let Footprint { half_length_m: a, half_width_m: b, .. } = self.footprint;
         let (mut sum, mut weight) = (0.0, 0.0);
         let mut add = |w: f64, (along_m, across_m): (f64, f64)| {
@@ -61,9 +71,9 @@ impl Envelope {
             let gap_m = gap * self.scale_m;
             // Every gap stands for the same share of exp(−gap/scale), on a ring of this length.
             let ring_m = self.sides_m() + TAU * gap_m;
-            let w = self.scale_m * ring_m / (GAPS.len() * ROUND) as f64;
-            for k in 0..ROUND {
-                add(w, ring_point(a, b, gap_m, ring_m * (k as f64 + 0.5) / ROUND as f64));
+            let w = self.scale_m * ring_m / (GAPS.len() * round) as f64;
+            for k in 0..round {
+                add(w, ring_point(a, b, gap_m, ring_m * (k as f64 + 0.5) / round as f64));
             }
         }
         sum / weight
@@ -111,10 +121,10 @@ mod tests {
             }
             assert!((all / envelope.area_m2() - 1.0).abs() < 0.02, "{all} {}", envelope.area_m2());
             assert!(
-                (some / all - envelope.mean(right)).abs() < 0.05,
+                (some / all - envelope.mean(12, right)).abs() < 0.05,
                 "{} {}",
                 some / all,
-                envelope.mean(right)
+                envelope.mean(12, right)
             );
         }
     }

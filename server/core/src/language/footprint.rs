@@ -1,5 +1,8 @@
 //! The floor that a landmark takes, as a rectangle: all that factors need to know of its shape.
 
+// Inlined into loops over points, which run in wide registers.
+#![allow(clippy::inline_always)]
+
 /// An oriented rectangle in the map, the longer side along its axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Footprint {
@@ -115,6 +118,7 @@ impl Footprint {
     }
 
     /// (along, across): a point in the rectangle's own frame.
+    #[inline(always)]
     pub fn local(&self, x_m: f64, y_m: f64) -> (f64, f64) {
         let (dx, dy) = (x_m - self.x_m, y_m - self.y_m);
         (dx * self.axis.0 + dy * self.axis.1, dy * self.axis.0 - dx * self.axis.1)
@@ -129,9 +133,13 @@ impl Footprint {
     }
 
     /// Distance from the edge of a point given in the rectangle's frame; negative inside.
+    #[inline(always)]
     pub fn signed_distance_m(&self, (along_m, across_m): (f64, f64)) -> f64 {
         let (dx, dy) = (along_m.abs() - self.half_length_m, across_m.abs() - self.half_width_m);
-        if dx > 0.0 && dy > 0.0 { (dx * dx + dy * dy).sqrt() } else { dx.max(dy) }
+        // Comparisons that the compiler can do of many points at once.
+        let (out_x, out_y) = (if dx > 0.0 { dx } else { 0.0 }, if dy > 0.0 { dy } else { 0.0 });
+        let most = if dx > dy { dx } else { dy };
+        (out_x * out_x + out_y * out_y).sqrt() + if most > 0.0 { 0.0 } else { most }
     }
 }
 

@@ -11,6 +11,7 @@ use super::Relation;
 use super::act::Frame;
 use super::clause::{LandmarkBelief, Reading};
 use super::factor::{Factor, Target};
+use super::scales::Scales;
 use super::scene::Scene;
 
 /// A place as grounding sees it, in one particle's map.
@@ -70,8 +71,19 @@ pub fn ground_clause(
     speaker: usize,
     figure_prior: &[f64],
 ) -> Grounding {
+    ground_with(&Scales::FITTED, readings, places, speaker, figure_prior)
+}
+
+/// As [`ground_clause`], by templates of other scales.
+pub fn ground_with(
+    scales: &Scales,
+    readings: &[Reading],
+    places: &[GroundPlace],
+    speaker: usize,
+    figure_prior: &[f64],
+) -> Grounding {
     let cells_m2: Vec<f64> = (0..places.len()).map(|i| cell_length_m(places, i) * CELL_WIDTH_M).collect();
-    let (density, p_known) = clause_density(readings, places, speaker);
+    let (density, p_known) = clause_density(scales, readings, places, speaker);
     let p_unknown = (1.0 - p_known).max(0.0);
     let seen: f64 = density.iter().zip(&cells_m2).map(|(f, a)| f * a).sum();
     // Several passes over the same floor must not count it twice.
@@ -98,27 +110,30 @@ pub fn ground_clause(
 
 /// Σ over readings, frames and landmarks of their probability times f(figure, landmark), per m² at every
 /// place: (15), whose terms are the factors of (16). Beside it the probability of all these terms.
-fn clause_density(readings: &[Reading], places: &[GroundPlace], speaker: usize) -> (Vec<f64>, f64) {
+fn clause_density(
+    scales: &Scales,
+    readings: &[Reading],
+    places: &[GroundPlace],
+    speaker: usize,
+) -> (Vec<f64>, f64) {
     let mut density = vec![0.0; places.len()];
     let mut total = 0.0;
-    let Some(scene) = Scene::new(places, speaker) else { return (density, total) };
+    let Some(scene) = Scene::new(places, speaker, *scales) else { return (density, total) };
     let mut kept: Vec<&Reading> =
         readings.iter().filter(|r| r.weight.is_finite() && r.weight > 0.0).collect();
     kept.sort_by(|a, b| b.weight.total_cmp(&a.weight));
     kept.truncate(MAX_READINGS);
     let scale = 1.0 / kept.iter().map(|r| r.weight).sum::<f64>().max(1.0);
-    let (mut path, mut of_reading) = (Vec::new(), Vec::new());
+    let mut of_reading = Vec::new();
     for reading in kept {
         let targets = targets(&scene, reading.landmarks);
         of_reading.clear();
         of_reading.resize(places.len(), 0.0);
         for &(target, p) in &targets {
             for (frame, share) in frames(reading) {
-                let narrowing = reading.narrowing;
-                let factor = Factor::new(&scene, reading.relation, frame, narrowing, target, &mut path);
-                let Some(factor) = factor else { continue };
-                for (k, sum) in of_reading.iter_mut().enumerate() {
-                    *sum += p * share * factor.density(k, &mut path);
+                let factor = Factor::new(&scene, reading.relation, frame, reading.narrowing, target);
+                if let Some(factor) = factor {
+                    factor.add_densities(p * share, &mut of_reading);
                 }
             }
         }
@@ -140,10 +155,20 @@ fn without_landmarks(scene: &Scene, density: &mut [f64], targets: &[(Target, f64
     let top = targets.iter().map(|t| t.1).fold(f64::MIN_POSITIVE, f64::max);
     for &(target, p) in targets {
         for place in [Some(target.place), target.other].into_iter().flatten() {
+            let rest = 1.0 - p / top;
             let room = scene.room(place).filter(|_| !target.way);
-            for visit in room.map_or([place..place + 1, 0..0], |r| r.visits) {
-                for f in &mut density[visit] {
-                    *f *= 1.0 - p / top;
+            let Some(room) = room else {
+                density[place] *= rest;
+                continue;
+            };
+            let floor = scene.footprint(place, false);
+            let inside = |k: usize| {
+                let (x_m, y_m) = scene.at(k);
+                floor.signed_distance_m(floor.local(x_m, y_m)) <= 0.0
+            };
+            for (k, f) in density.iter_mut().enumerate().filter(|(_, f)| **f > 0.0) {
+                if room.visits.iter().any(|v| v.contains(&k)) || inside(k) {
+                    *f *= rest;
                 }
             }
         }

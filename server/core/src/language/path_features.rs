@@ -1,10 +1,17 @@
 //! How a path lies to a landmark, as numbers: what the factors of path relations are learned on.
 
+// Inlined, loops over points run in wide registers. Indices, since iterators' closures are calls.
+#![allow(clippy::inline_always, clippy::needless_range_loop)]
+
 use super::footprint::Footprint;
+use super::ways::Step;
+use crate::wide::wide;
 use std::f64::consts::{PI, TAU};
 
 /// Numbers that describe a path beside a landmark.
 pub const FEATURES: usize = 36;
+/// The one that is zero if the path comes into the landmark.
+pub(super) const GAP_MIN: usize = 5;
 /// Points, equally far apart on the path, that it is seen by.
 const SAMPLES: usize = 12;
 /// Where ratios are cut: a path that much longer than the landmark is simply long, and few examples
@@ -13,41 +20,52 @@ const RATIO_MAX: f64 = 1.2;
 const LOG_RANGE: (f64, f64) = (-2.0, 2.5);
 const TURNS_MAX: f64 = 1.5;
 
-/// A path seen at equal steps, in the landmark's frame.
+/// A path seen at equal steps, in the landmark's frame: coordinates along and across it, metres.
 struct Samples {
-    at: [(f64, f64); SAMPLES],
+    along: [f64; SAMPLES],
+    across: [f64; SAMPLES],
     length_m: f64,
 }
 
 impl Samples {
-    /// None if the path is no path: no points, or not finite.
-    fn new(path: &[(f64, f64)], landmark: &Footprint) -> Option<Self> {
-        let step_m = |w: &[(f64, f64)]| norm(difference(w[1], w[0]));
-        let length_m: f64 = path.windows(2).map(step_m).sum();
-        let &first = path.first()?;
-        if !(length_m.is_finite() && first.0.is_finite() && first.1.is_finite()) {
+    /// None if the path is not finite.
+    #[inline(always)]
+    fn new(start: Step, rest: &[Step], landmark: &Footprint) -> Option<Self> {
+        let length_m = rest.last().map_or(start.walk_m, |s| s.walk_m) - start.walk_m;
+        if !(length_m.is_finite() && start.at.0.is_finite() && start.at.1.is_finite()) {
             return None;
         }
-        let mut at = [landmark.local(first.0, first.1); SAMPLES];
-        let (mut k, mut walked_m) = (0, 0.0);
-        for (s, point) in at.iter_mut().enumerate().skip(1) {
-            let want_m = length_m * s as f64 / (SAMPLES - 1) as f64;
-            let (mut here_m, mut f) = (0.0, 0.0);
-            while k + 1 < path.len() {
-                here_m = step_m(&path[k..k + 2]);
-                f = if here_m > 0.0 { ((want_m - walked_m) / here_m).clamp(0.0, 1.0) } else { 0.0 };
-                if walked_m + here_m >= want_m || k + 2 == path.len() {
-                    break;
-                }
-                walked_m += here_m;
-                k += 1;
-            }
-            let (a, b) = (path[k], *path.get(k + 1).unwrap_or(&path[k]));
-            let f = if here_m > 0.0 { f } else { 0.0 };
-            *point = landmark.local(a.0 + f * (b.0 - a.0), a.1 + f * (b.1 - a.1));
+        let mut samples = Self { along: [0.0; SAMPLES], across: [0.0; SAMPLES], length_m };
+        for s in 0..SAMPLES {
+            let share = s as f64 / (SAMPLES - 1) as f64;
+            let (x_m, y_m) = point_at(start, rest, share * length_m, (share * rest.len() as f64) as usize);
+            (samples.along[s], samples.across[s]) = landmark.local(x_m, y_m);
         }
-        Some(Self { at, length_m: length_m.max(1e-3) })
+        samples.length_m = length_m.max(1e-3);
+        Some(samples)
     }
+
+    #[inline(always)]
+    fn at(&self, k: usize) -> (f64, f64) {
+        (self.along[k], self.across[k])
+    }
+}
+
+/// The point so far along a path, which is looked for from a step of `rest` on, guessed to be near.
+#[inline(always)]
+fn point_at(start: Step, rest: &[Step], from_start_m: f64, guess: usize) -> (f64, f64) {
+    let Some(last) = rest.len().checked_sub(1) else { return start.at };
+    let (walk_m, mut k) = (start.walk_m + from_start_m, guess.min(last));
+    while k < last && rest[k].walk_m < walk_m {
+        k += 1;
+    }
+    while k > 0 && rest[k - 1].walk_m >= walk_m {
+        k -= 1;
+    }
+    let (a, b) = (if k > 0 { rest[k - 1] } else { start }, rest[k]);
+    let step_m = b.walk_m - a.walk_m;
+    let f = if step_m > 0.0 { ((walk_m - a.walk_m) / step_m).clamp(0.0, 1.0) } else { 0.0 };
+    (a.at.0 + f * (b.at.0 - a.at.0), a.at.1 + f * (b.at.1 - a.at.1))
 }
 
 /// What is summed up over the samples of a path.
@@ -65,44 +83,97 @@ struct Totals {
 }
 
 impl Totals {
+    #[inline(always)]
     fn new(path: &Samples, landmark: &Footprint) -> Self {
+        let (u, v) = (&path.along, &path.across);
+        let (a, b) = (landmark.half_length_m, landmark.half_width_m);
+        let (mut gap_m, mut centre_m2, mut across_m) = ([0.0; SAMPLES], [0.0; SAMPLES], [0.0; SAMPLES]);
+        let (mut inside, mut within_a, mut within_b) = ([0.0; SAMPLES], [0.0; SAMPLES], [0.0; SAMPLES]);
+        for k in 0..SAMPLES {
+            let signed_m = landmark.signed_distance_m((u[k], v[k]));
+            gap_m[k] = if signed_m > 0.0 { signed_m } else { 0.0 };
+            centre_m2[k] = u[k] * u[k] + v[k] * v[k];
+            across_m[k] = v[k].abs();
+            inside[k] = f64::from(signed_m <= 0.0);
+            within_a[k] = f64::from(u[k].abs() < a);
+            within_b[k] = f64::from(v[k].abs() < b);
+        }
         let share = 1.0 / SAMPLES as f64;
-        let mut t = Self {
-            inside: 0.0,
-            gap_min_m: f64::INFINITY,
-            gap_mean_m: 0.0,
-            centre_min_m: f64::INFINITY,
-            centre_min_at: 0.0,
-            within_length: 0.0,
-            within_width: 0.0,
-            across_mean_m: 0.0,
-            turned_rad: 0.0,
-            round_rad: 0.0,
-        };
-        for (k, &(u, v)) in path.at.iter().enumerate() {
-            let signed_m = landmark.signed_distance_m((u, v));
-            let gap_m = signed_m.max(0.0);
-            t.inside += share * f64::from(signed_m <= 0.0);
-            t.gap_min_m = t.gap_min_m.min(gap_m);
-            t.gap_mean_m += share * gap_m;
-            let centre_m = norm((u, v));
-            if centre_m < t.centre_min_m {
-                (t.centre_min_m, t.centre_min_at) = (centre_m, k as f64 / (SAMPLES - 1) as f64);
-            }
-            t.within_length += share * f64::from(u.abs() < landmark.half_length_m);
-            t.within_width += share * f64::from(v.abs() < landmark.half_width_m);
-            t.across_mean_m += share * v.abs();
+        let centre_min_m2 = least(&centre_m2);
+        let nearest = centre_m2.iter().position(|m2| *m2 <= centre_min_m2).unwrap_or(0);
+        Self {
+            inside: share * sum(&inside),
+            gap_min_m: least(&gap_m),
+            gap_mean_m: share * sum(&gap_m),
+            centre_min_m: centre_min_m2.sqrt(),
+            centre_min_at: nearest as f64 / (SAMPLES - 1) as f64,
+            within_length: share * sum(&within_a),
+            within_width: share * sum(&within_b),
+            across_mean_m: share * sum(&across_m),
+            turned_rad: turned_rad(u, v),
+            round_rad: round_rad(u, v),
         }
-        // Turns between vectors, by one cross and one dot product each: no angle jumps.
-        let turn = |a: (f64, f64), b: (f64, f64)| angle(a.0 * b.1 - a.1 * b.0, a.0 * b.0 + a.1 * b.1);
-        for w in path.at.windows(2) {
-            t.round_rad += turn(w[0], w[1]);
-        }
-        for w in path.at.windows(3) {
-            t.turned_rad += turn(difference(w[1], w[0]), difference(w[2], w[1])).abs();
-        }
-        t
     }
+}
+
+/// Four sums at once: one after the other, each would wait for the last.
+#[inline(always)]
+fn sum(of: &[f64; SAMPLES]) -> f64 {
+    let mut sums = [0.0; 4];
+    for four in of.as_chunks::<4>().0 {
+        for k in 0..4 {
+            sums[k] += four[k];
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3])
+}
+
+/// The least of some numbers. (`min` looks for NaN, which takes as long again.)
+#[inline(always)]
+fn least(of: &[f64; SAMPLES]) -> f64 {
+    let mut least = [f64::INFINITY; 4];
+    for four in of.as_chunks::<4>().0 {
+        for k in 0..4 {
+            least[k] = if four[k] < least[k] { four[k] } else { least[k] };
+        }
+    }
+    least.into_iter().fold(f64::INFINITY, |least, m| if m < least { m } else { least })
+}
+
+/// Turns from step to step, all counted as positive; by one cross and one dot product each.
+#[inline(always)]
+fn turned_rad(u: &[f64; SAMPLES], v: &[f64; SAMPLES]) -> f64 {
+    // One step less than points, one turn less than steps: the last ones are none.
+    let (mut du, mut dv) = ([0.0; SAMPLES + 1], [0.0; SAMPLES + 1]);
+    for k in 0..SAMPLES - 1 {
+        (du[k], dv[k]) = (u[k + 1] - u[k], v[k + 1] - v[k]);
+    }
+    let mut turns = [0.0; SAMPLES];
+    for k in 0..SAMPLES {
+        let cross = du[k] * dv[k + 1] - dv[k] * du[k + 1];
+        turns[k] = angle(cross, du[k] * du[k + 1] + dv[k] * dv[k + 1]).abs();
+    }
+    sum(&turns)
+}
+
+/// The angle that a path sweeps round the landmark's middle, in all: that from its start to its end,
+/// and whole turns, which are counted where it crosses the ray opposite the start.
+#[inline(always)]
+fn round_rad(u: &[f64; SAMPLES], v: &[f64; SAMPLES]) -> f64 {
+    let mut off_m2 = [0.0; SAMPLES];
+    for k in 0..SAMPLES {
+        off_m2[k] = u[0] * v[k] - v[0] * u[k];
+    }
+    let mut turns = [0.0; SAMPLES];
+    for k in 0..SAMPLES - 1 {
+        let leftward = u[k] * v[k + 1] - v[k] * u[k + 1];
+        let (was_left, is_left) = (off_m2[k] >= 0.0, off_m2[k + 1] >= 0.0);
+        // From left to right against the clock, or the other way round: behind the middle.
+        let left = f64::from(was_left && !is_left && leftward > 0.0);
+        turns[k] = left - f64::from(!was_left && is_left && leftward < 0.0);
+    }
+    let last = SAMPLES - 1;
+    angle(off_m2[last], u[0] * u[last] + v[0] * v[last]) + TAU * sum(&turns)
 }
 
 /// Describes a path, from its start, beside a landmark; all zero if it is no path.
@@ -110,11 +181,31 @@ impl Totals {
 /// Lengths are divided by the landmark's or the path's, or saturate, so that a factor learned on
 /// chairs and hallways holds for both.
 pub fn path_features(path: &[(f64, f64)], landmark: &Footprint) -> [f64; FEATURES] {
-    let Some(path) = Samples::new(path, landmark) else { return [0.0; FEATURES] };
+    let Some(&at) = path.first() else { return [0.0; FEATURES] };
+    let start = Step { at, walk_m: 0.0 };
+    let walk = |last: &mut Step, &at: &(f64, f64)| {
+        *last = last.to(at);
+        Some(*last)
+    };
+    let rest: Vec<Step> = path[1..].iter().scan(start, walk).collect();
+    features_of_steps(start, &rest, landmark)
+}
+
+/// Describes the path from `start` over `rest`.
+pub(super) fn features_of_steps(start: Step, rest: &[Step], landmark: &Footprint) -> [f64; FEATURES] {
+    wide(
+        #[inline(always)]
+        || features(start, rest, landmark),
+    )
+}
+
+#[inline(always)]
+fn features(start: Step, rest: &[Step], landmark: &Footprint) -> [f64; FEATURES] {
+    let Some(path) = Samples::new(start, rest, landmark) else { return [0.0; FEATURES] };
     let t = Totals::new(&path, landmark);
     let (a, b) = (landmark.half_length_m, landmark.half_width_m);
     let (size_m, reach_m) = (2.0 * (a * b).sqrt(), norm((a, b)));
-    let (start, end) = (path.at[0], path.at[SAMPLES - 1]);
+    let (start, end) = (path.at(0), path.at(SAMPLES - 1));
     let (start_m, end_m) = (landmark.signed_distance_m(start), landmark.signed_distance_m(end));
     let (start_out_m, end_out_m) = (start_m.max(0.0), end_m.max(0.0));
     let (from_m, to_m) = (norm(start), norm(end));
@@ -124,8 +215,8 @@ pub fn path_features(path: &[(f64, f64)], landmark: &Footprint) -> [f64; FEATURE
     // Where on the chord the landmark's middle lies, 0 at the start and 1 at the end.
     let passed = (-(start.0 * moved.0 + start.1 * moved.1) / (chord_m * chord_m).max(1e-6)).clamp(-1.0, 2.0);
     let offset_m = (moved.0 * start.1 - moved.1 * start.0).abs() / chord_m.max(1e-3);
-    let leaving = difference(path.at[2], start);
-    let arriving = difference(end, path.at[SAMPLES - 3]);
+    let leaving = difference(path.at(2), start);
+    let arriving = difference(end, path.at(SAMPLES - 3));
     [
         f64::from(start_m <= 0.0),
         f64::from(end_m <= 0.0),
@@ -166,38 +257,45 @@ pub fn path_features(path: &[(f64, f64)], landmark: &Footprint) -> [f64; FEATURE
     ]
 }
 
+#[inline(always)]
 fn difference(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 - b.0, a.1 - b.1)
 }
 
 /// Length of a vector. (`hypot` guards against overflow, which metres don't, and takes ten times longer.)
+#[inline(always)]
 fn norm(a: (f64, f64)) -> f64 {
     (a.0 * a.0 + a.1 * a.1).sqrt()
 }
 
 /// `atan2` to 0.3°, which no feature needs better: it is most of what a path costs.
+#[inline(always)]
 fn angle(y: f64, x: f64) -> f64 {
-    let (low, high) = (y.abs().min(x.abs()), y.abs().max(x.abs()));
+    let steep = y.abs() > x.abs();
+    let (low, high) = if steep { (x.abs(), y.abs()) } else { (y.abs(), x.abs()) };
     let t = if high > 0.0 { low / high } else { 0.0 };
     // Odd polynomial on 0…1, Hastings (1955).
     let s = t * t;
     let first = t * (0.995_354 + s * (-0.288_679 + s * 0.079_331));
-    let half = if y.abs() > x.abs() { PI / 2.0 - first } else { first };
+    let half = if steep { PI / 2.0 - first } else { first };
     let whole = if x < 0.0 { PI - half } else { half };
     if y < 0.0 { -whole } else { whole }
 }
 
 /// A length against a scale, from 0 to 1.
+#[inline(always)]
 fn share(x_m: f64, scale_m: f64) -> f64 {
     x_m / (x_m + scale_m)
 }
 
 /// How clearly two coordinates lie on opposite sides of zero (to 1) or on the same (to −1).
+#[inline(always)]
 fn opposite(start_m: f64, end_m: f64, half_m: f64) -> f64 {
     let product = start_m * end_m;
     -product.signum() * share(product.abs().sqrt(), half_m)
 }
 
+#[inline(always)]
 fn cosine(a: (f64, f64), b: (f64, f64)) -> f64 {
     (a.0 * b.0 + a.1 * b.1) / (norm(a) * norm(b)).max(1e-9)
 }
@@ -222,6 +320,32 @@ mod tests {
         for k in -180..180 {
             let (sin, cos) = f64::from(k).to_radians().sin_cos();
             assert!((angle(sin, cos) - sin.atan2(cos)).abs() < 0.006, "{k}°");
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn totals_are_those_of_one_point_after_the_other(
+            path in prop::collection::vec((-9.0..9.0, -9.0..9.0), 2..9), long in 0.1..9.0, wide in 0.1..3.0,
+        ) {
+            let landmark = Footprint::strip((-1.0, 0.0), (long, 2.0), wide);
+            let start = Step { at: path[0], walk_m: 0.0 };
+            let rest: Vec<Step> =
+                path[1..].iter().scan(start, |s, &at| { *s = s.to(at); Some(*s) }).collect();
+            let samples = Samples::new(start, &rest, &landmark).unwrap();
+            let t = Totals::new(&samples, &landmark);
+            let at: Vec<(f64, f64)> = (0..SAMPLES).map(|k| samples.at(k)).collect();
+            let turn = |a: (f64, f64), b: (f64, f64)| (a.0 * b.1 - a.1 * b.0).atan2(a.0 * b.0 + a.1 * b.1);
+            let round: f64 = at.windows(2).map(|w| turn(w[0], w[1])).sum();
+            let moved: Vec<_> = at.windows(2).map(|w| difference(w[1], w[0])).collect();
+            let turned: f64 = moved.windows(2).map(|w| turn(w[0], w[1]).abs()).sum();
+            prop_assert!((t.round_rad - round).abs() < 0.01, "{} {round}", t.round_rad);
+            prop_assert!((t.turned_rad - turned).abs() < 0.06, "{} {turned}", t.turned_rad);
+            let gaps_m = || at.iter().map(|p| landmark.signed_distance_m(*p).max(0.0));
+            prop_assert!((t.gap_mean_m * SAMPLES as f64 - gaps_m().sum::<f64>()).abs() < 1e-9);
+            prop_assert!((t.gap_min_m - gaps_m().fold(f64::INFINITY, f64::min)).abs() < 1e-12);
+            let inside = gaps_m().filter(|m| *m <= 0.0).count() as f64;
+            prop_assert!((t.inside * SAMPLES as f64 - inside).abs() < 1e-9);
         }
     }
 

@@ -3,14 +3,16 @@
 
 use super::footprint::Footprint;
 use super::ground::GroundPlace;
+use super::scales::Scales;
 use super::ways::Ways;
+use std::cell::OnceCell;
 
 /// The approach whose direction is "ahead".
 const APPROACH_M: f64 = 2.0;
 /// Half of what a landmark takes of which only the place is known: a room of some 3 m.
 const SPOT_HALF_M: f64 = 1.5;
 /// Half of a hallway's width, and how far off its middle line a robot keeps on it.
-const WAY_HALF_M: f64 = 1.2;
+pub(super) const WAY_HALF_M: f64 = 1.2;
 /// Longest stretch without a place on a hallway that is driven along: excursions into rooms between.
 const WAY_GAP_M: f64 = 3.0;
 /// No hallway is followed further.
@@ -21,6 +23,8 @@ const ROOM_MARGIN_M: f64 = 0.8;
 const OUTLINE_MAX: usize = 24;
 /// So near the middle line of the hallway one is back in it.
 const HINGE_M: f64 = 0.7;
+/// Back at a place is within so much of it.
+const HERE_M: f64 = 1.2;
 /// A room is entered within so much path from the hallway …
 const ENTRY_MAX_M: f64 = 12.0;
 /// … after a turn of at least this (cos 50°).
@@ -30,12 +34,14 @@ const ENTRY_COS: f64 = 0.64;
 pub struct Scene<'a> {
     /// All places.
     pub places: &'a [GroundPlace],
-    /// Ways from the speaker.
-    pub ways: Ways,
+    /// Ways from the speaker, once they are asked for: most relations don't.
+    ways: OnceCell<Ways>,
     /// The speaker's place.
     pub speaker: usize,
     /// Unit vector of the approach.
     pub ahead: (f64, f64),
+    /// Of the templates.
+    pub scales: Scales,
 }
 
 /// A room, by what was driven of it, and how it lies to the hallway that it was entered from.
@@ -51,10 +57,25 @@ pub struct Room {
 
 impl<'a> Scene<'a> {
     /// From the place held when the sentence began; none if there is no such place.
-    pub fn new(places: &'a [GroundPlace], speaker: usize) -> Option<Self> {
+    pub fn new(places: &'a [GroundPlace], speaker: usize, scales: Scales) -> Option<Self> {
         let here = places.get(speaker)?;
         let ahead = heading(places, speaker).unwrap_or((here.yaw_rad.cos(), here.yaw_rad.sin()));
-        Some(Self { places, ways: Ways::new(places, speaker), speaker, ahead })
+        Some(Self { places, ways: OnceCell::new(), speaker, ahead, scales })
+    }
+
+    /// Ways from the speaker.
+    pub fn ways(&self) -> &Ways {
+        self.ways.get_or_init(|| Ways::new(self.places, self.speaker))
+    }
+
+    /// Length of the way from the speaker to a place; straight, where none is known.
+    pub fn walk_m(&self, place: usize) -> f64 {
+        self.ways().walk_m(place).unwrap_or_else(|| self.straight_m(self.at(place)))
+    }
+
+    /// From the speaker straight to a point.
+    pub fn straight_m(&self, at: (f64, f64)) -> f64 {
+        (at.0 - self.stand().0).hypot(at.1 - self.stand().1)
     }
 
     /// Where the speaker stands.
@@ -140,9 +161,13 @@ impl<'a> Scene<'a> {
         let before = (0..place).rev().take_while(near).find(in_hallway);
         let after = (place + 1..count).take_while(near).find(in_hallway);
         let (first, after) = (before? + 1, after?);
-        let depth = (place + 1 - first).min(after - place);
-        let visits = [first..first + depth, (after - depth).max(first + depth)..after];
-        Some(Room { visits, hinge, along })
+        // What was driven between the first time here and the last lies behind.
+        let here = |&k: &usize| (self.at(k).0 - p.x_m).hypot(self.at(k).1 - p.y_m) <= HERE_M;
+        let enter = (first..=place).find(here).unwrap_or(place);
+        let leave = (place..after).rev().find(here).unwrap_or(place);
+        let inner = (enter..=leave).take_while(here).last().unwrap_or(place) + 1;
+        let outer = (inner..=leave).rev().take_while(here).last().unwrap_or(inner);
+        Some(Room { visits: [first..inner, outer..after], hinge, along })
     }
 
     /// The place, of some in order from one in a room, where the robot went across the way in or
@@ -165,11 +190,11 @@ impl<'a> Scene<'a> {
 }
 
 impl Room {
-    /// The point as far on the other side of the hallway.
-    pub fn mirror(&self, at: (f64, f64)) -> (f64, f64) {
+    /// Unit vector from the hallway to the side where a point lies.
+    pub fn inward(&self, at: (f64, f64)) -> (f64, f64) {
         let (dx, dy) = (at.0 - self.hinge.0, at.1 - self.hinge.1);
-        let across_m = dy * self.along.0 - dx * self.along.1;
-        (at.0 + 2.0 * across_m * self.along.1, at.1 - 2.0 * across_m * self.along.0)
+        let side = if dy * self.along.0 - dx * self.along.1 >= 0.0 { 1.0 } else { -1.0 };
+        (-side * self.along.1, side * self.along.0)
     }
 
     /// What was driven inside, farther from the hallway's middle than half its width.
@@ -191,6 +216,6 @@ fn heading(places: &[GroundPlace], place: usize) -> Option<(f64, f64)> {
 /// Unit vector to `a` from `b`; none if they are one point.
 pub fn unit(a: (f64, f64), b: (f64, f64)) -> Option<(f64, f64)> {
     let (dx, dy) = (a.0 - b.0, a.1 - b.1);
-    let length_m = dx.hypot(dy);
+    let length_m = (dx * dx + dy * dy).sqrt();
     (length_m.is_finite() && length_m > 0.1).then(|| (dx / length_m, dy / length_m))
 }

@@ -8,8 +8,8 @@
 // Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
 #![allow(clippy::inline_always)]
 
+pub(super) use crate::wide::wide;
 use nalgebra::Matrix3;
-use pulp::{Arch, Simd, WithSimd};
 use std::ops::Range;
 
 /// A pivot that keeps less than this share of its diagonal has lost all digits.
@@ -17,25 +17,6 @@ const PIVOT_MIN: f64 = 1e-14;
 /// Elimination by Cholesky would lose digits; the front is spoilt.
 #[derive(Debug)]
 pub(super) struct Ill;
-
-struct Wide<F>(F);
-
-// A closure given to `dispatch` as it is runs behind a shim that is not inlined, in the registers that
-// every processor has.
-impl<R, F: FnMut() -> R> WithSimd for Wide<F> {
-    type Output = R;
-
-    #[inline(always)]
-    fn with_simd<S: Simd>(mut self, _: S) -> R {
-        (self.0)()
-    }
-}
-
-/// Runs an `#[inline(always)]` closure in the widest registers that the processor has.
-#[inline(always)]
-pub(super) fn wide<R>(work: impl FnMut() -> R) -> R {
-    Arch::new().dispatch(Wide(work))
-}
 
 /// The block of a panel that begins at a row.
 #[inline(always)]

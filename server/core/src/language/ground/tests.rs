@@ -120,6 +120,53 @@ fn rooms_are_told_apart() {
 }
 
 #[test]
+fn a_neighbour_is_on_the_same_side() {
+    // Rooms 5 m apart, and one nearer, over the hallway.
+    let route = [(0.0, 0.0), (4.0, 0.0), (4.0, 4.0), (4.0, 0.0), (9.0, 0.0), (9.0, 4.0), (9.0, 0.0)];
+    let back = [(16.0, 0.0), (4.0, 0.0), (4.0, -4.0), (4.0, 0.0), (0.0, 0.0)];
+    let places = drive(&route.into_iter().chain(back).collect::<Vec<_>>());
+    let g = ground(Relation::NextTo, &places, 1, &[(place_at(&places, 4.0, 4.0), 1.0)], &[]);
+    let (x, side, share) = best_room(&places, &g);
+    assert!(x == 9 && side == 1 && share > 0.7, "{x} {side} {share}");
+}
+
+#[test]
+fn through_a_room_is_what_lies_behind_it() {
+    // Into a room at x = 8, from there into two others behind it, and on along the hallway.
+    let route = [(0.0, 0.0), (8.0, 0.0), (8.0, 3.0), (5.0, 6.0), (8.0, 3.0), (11.0, 6.0), (8.0, 3.0)];
+    let on = [(8.0, 0.0), (12.0, 0.0), (12.0, 4.0), (12.0, 0.0), (20.0, 0.0)];
+    let places = drive(&route.into_iter().chain(on).collect::<Vec<_>>());
+    // The landmark was named the second time one was there.
+    let named = place_at(&places[12..], 8.0, 3.0) + 12;
+    let g = ground(Relation::Through, &places, 2, &[(named, 1.0)], &[]);
+    let behind: f64 = g.p.iter().zip(&places).filter(|(_, at)| at.y_m > 3.5).map(|(p, _)| p).sum();
+    assert!(behind > 0.9 * g.p.iter().sum::<f64>() && behind > 0.1, "{behind} {:?}", g.p);
+}
+
+#[test]
+fn doors_are_counted_rather_than_paced_off() {
+    // Doors at 4, 8, …: the first beyond a long wall, and one so near that it can't be the second.
+    let stand = (9.5, 0.0);
+    let places = floor();
+    let here = place_at(&places, stand.0, stand.1);
+    let nth = |doors| {
+        let narrowing = Narrowing { doors: Some(doors), ..Narrowing::default() };
+        say(Relation::LeftSide, narrowing, &[here], true, stand)
+    };
+    for (doors, x) in [(1, 12), (2, 16), (3, 20)] {
+        let (best, side, share) = nth(doors);
+        assert!(best == x && side == 1 && share > 0.5, "{doors}: {best} {side} {share}");
+    }
+    let wall =
+        drive(&[(0.0, 0.0), (17.0, 0.0), (17.0, 4.0), (17.0, 0.0), (20.0, 0.0), (20.0, 4.0), (20.0, 0.0)]);
+    let narrowing = Narrowing { doors: Some(1), ..Narrowing::default() };
+    let landmarks = [LandmarkBelief { places: &[(1, 1.0)], way: true }];
+    let reading =
+        Reading { weight: 1.0, relation: Relation::LeftSide, frame: None, narrowing, landmarks: &landmarks };
+    assert_eq!(best_room(&wall, &ground_clause(&[reading], &wall, 1, &[])).0, 17);
+}
+
+#[test]
 fn just_past_is_closer() {
     let places = floor();
     let kitchen = [(place_at(&places, 8.0, 4.0), 1.0)];
@@ -155,8 +202,10 @@ fn readings_are_summed_out() {
     let (seen, own) = (place_at(&places, 8.0, 4.0), place_at(&places, 16.0, 4.0));
     assert!(left[seen] > left[own] && left[own] > 0.1 * left[seen]);
     // What the weights lack says nothing.
-    let half = ground_clause(&[reading(0.5, Relation::AcrossFrom, None)], &places, speaker, &[]);
-    assert!(half.p_elsewhere > 0.7);
+    let elsewhere = |weight| {
+        ground_clause(&[reading(weight, Relation::AcrossFrom, None)], &places, speaker, &[]).p_elsewhere
+    };
+    assert!(elsewhere(0.25) > elsewhere(0.5) + 0.1 && elsewhere(0.5) >= elsewhere(1.0));
 }
 
 #[test]
