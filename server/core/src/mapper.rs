@@ -4,7 +4,7 @@ use crate::effects::{Effect, Effects, TrackState};
 use crate::event::{Laser, Odom, Scan, Setup, StampNs, Utterance};
 use crate::filter::Filter;
 use crate::geometry::Pose2;
-use crate::graph::{Place, Vertex};
+use crate::graph::{Graph, Place, Vertex};
 use crate::listen::Here;
 use crate::odometry::{Odometry, Step};
 use crate::particle::{Edge, Particle};
@@ -141,6 +141,11 @@ impl Mapper {
         Ok(mapper)
     }
 
+    /// What all particles share: places, and what ties each to the one before.
+    pub fn graph(&self) -> &Graph {
+        &self.filter.graph
+    }
+
     /// Its settings.
     pub fn config(&self) -> &Config {
         &self.filter.config
@@ -193,9 +198,8 @@ impl Mapper {
             return;
         };
         let Some(laser) = self.track.lasers.get(&scan.laser) else { return };
-        let odometry = &self.track.odometry;
         let motion = |dt_s: f64| {
-            odometry
+            (self.track.odometry)
                 .at(stamp_ns.saturating_add((dt_s * 1e9) as i64))
                 .map_or(Pose2::default(), |p| odom_from_body.between(&p))
         };
@@ -275,12 +279,11 @@ impl Mapper {
 
     fn tracked(&self, stamp_ns: StampNs, odom_from_body: Pose2) -> Effect {
         let map_from_body = self.map_from_body().unwrap_or_default();
-        let covariance = self.covariance();
         Effect::Tracked {
             stamp_ns,
             map_from_body,
             map_from_odom: map_from_body.compose(&odom_from_body.inverse()),
-            covariance,
+            covariance: self.covariance(),
             state: if self.is_lost() { TrackState::Lost } else { TrackState::Mapping },
         }
     }

@@ -1,0 +1,41 @@
+//! What simulated drives, whose truth is known, say about the metric half of the filter.
+//!
+//! ```sh
+//! toponym simulate drives/1 --plan PLAN.xml --lidar rplidar --people 4      # and so on
+//! cargo run --release -p toponym-core --example drives -- coverage drives/*
+//! ```
+//! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
+//!
+//! A drive is a folder with `sim.rec` and `truth.json`, as `toponym simulate` makes them. Any log will do:
+//! `toponym-server serve --record` makes the one, `trajectory` rows `[t, x, y, yaw]` are the other.
+#![allow(clippy::unwrap_used, reason = "a tool: a wrong file ends it")]
+
+mod coverage;
+mod drive;
+
+use clap::{Parser, Subcommand};
+use drive::Drive;
+use std::path::PathBuf;
+
+#[derive(Parser)]
+#[command(about = "Checks by simulated drives what increments are worth")]
+struct Args {
+    #[command(subcommand)]
+    what: What,
+}
+
+#[derive(Subcommand)]
+enum What {
+    /// Share of increments of the front end whose 95 % region covers the truth.
+    Coverage {
+        /// Folders.
+        #[arg(required = true)]
+        drives: Vec<PathBuf>,
+    },
+}
+
+fn main() {
+    match Args::parse().what {
+        What::Coverage { drives } => drives.iter().for_each(|d| coverage::report(&Drive::read(d))),
+    }
+}
