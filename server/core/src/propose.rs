@@ -130,7 +130,7 @@ pub fn propose(
 /// What equal particles would look at for the names of a place, wherever the robot is now: any other
 /// place left, older or newer.
 pub fn propose_named(config: &Config, graph: &Graph, particle: &Particle, v: Vertex) -> Vec<Proposal> {
-    if !config.semantic_edges {
+    if !(config.loops && config.semantic_edges) {
         return Vec::new();
     }
     let left = graph.places().len() as Vertex;

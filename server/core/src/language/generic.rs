@@ -22,8 +22,12 @@ pub(super) fn generic_clause(at: &mut Cursor) -> Option<Readings> {
 /// "If you see vending machines you're close to the gym".
 fn sign(at: &mut Cursor) -> Option<Content> {
     at.eat_any("if|when|whenever|once|where|wherever")?;
-    at.eat_any("you see|you find|you reach|you come to|you pass|you notice|there is|there are|we see")?;
-    let figure = at.noun_phrase().filter(|p| p.kind != Kind::No)?;
+    let how = at.eat_any(
+        "you see|you hear|you smell|you find|you reach|you come to|you pass|you notice|there is|there are|we see",
+    )?;
+    // What one hears or smells is no place, and rarely a thing.
+    let sensed = matches!(how, "you hear" | "you smell");
+    let figure = at.noun_phrase().filter(|p| sensed || p.kind != Kind::No)?;
     at.skip(",|then|that means");
     at.eat_any("you are|you will be|we are|you know you are|you must be")?;
     at.skip("usually|probably|very|quite|pretty|always");

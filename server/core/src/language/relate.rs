@@ -68,7 +68,7 @@ const PREPOSITIONS: [(&str, R); 34] = [
     ),
     ("past|passed|beyond|after|on past|once you pass|just after you pass", R::Past),
     ("around|round", R::Around),
-    ("out of|outside of|outside", R::OutOf),
+    ("out of|outside of|outside|out", R::OutOf),
     ("in back of|behind|around the back of|round the back of", R::Behind),
     ("in between|between", R::Between),
     ("on the way to|en route to|towards|toward|in the direction of", R::Towards),
@@ -150,7 +150,7 @@ impl Cursor<'_> {
                 self.step();
                 continue;
             }
-            if self.sees("right of|up the|over the|out of|up here") {
+            if self.sees("right of|up the|over the|out of|out the|out those|out these|up here") {
                 break;
             }
             if self.eat_any("just|right|directly|immediately|straight").is_some() {
