@@ -141,7 +141,7 @@ impl Mapper {
         Ok(mapper)
     }
 
-    /// What all particles share: places, and what ties each to the one before.
+    /// What all particles share.
     pub fn graph(&self) -> &Graph {
         &self.filter.graph
     }
@@ -198,8 +198,9 @@ impl Mapper {
             return;
         };
         let Some(laser) = self.track.lasers.get(&scan.laser) else { return };
+        let odometry = &self.track.odometry;
         let motion = |dt_s: f64| {
-            (self.track.odometry)
+            odometry
                 .at(stamp_ns.saturating_add((dt_s * 1e9) as i64))
                 .map_or(Pose2::default(), |p| odom_from_body.between(&p))
         };
@@ -355,7 +356,6 @@ mod tests {
     #[test]
     fn whatever_makes_another_particle_the_best_tells_that_coordinates_jump() {
         let mut mapper = Mapper::new(Config::default());
-        let robot = || "r".to_owned();
         let laser = Laser {
             id: "l".into(),
             body_from_laser: Pose2::default(),
@@ -364,11 +364,11 @@ mod tests {
             range_max_m: 30.0,
             ignored_rad: vec![],
         };
-        mapper.step(Event::Setup(Setup { robot: robot(), lasers: vec![laser] }));
-        let odom_from_body = Pose2::default();
-        mapper.step(Event::Odom(Odom { robot: robot(), boot: 0, stamp_ns: 0, odom_from_body }));
+        mapper.step(Event::Setup(Setup { robot: "r".into(), lasers: vec![laser] }));
+        let still = Odom { robot: "r".into(), boot: 0, stamp_ns: 0, odom_from_body: Pose2::default() };
+        mapper.step(Event::Odom(still));
         mapper.step(Event::Scan(Scan {
-            robot: robot(),
+            robot: "r".into(),
             laser: "l".into(),
             stamp_ns: 0,
             angle_min_rad: -1.5,
@@ -386,8 +386,7 @@ mod tests {
             factor: 0,
         };
         let other = mapper.filter.best().clone();
-        let with_edge = Particle { edges: Arc::new(vec![edge]), ..other.clone() };
-        mapper.filter.particles = vec![with_edge, other];
+        mapper.filter.particles = vec![Particle { edges: Arc::new(vec![edge]), ..other.clone() }, other];
         let mut effects = Effects::new();
         mapper.change(&mut effects, |_| Effects::new());
         assert_eq!((effects.len(), mapper.epoch), (0, 0));

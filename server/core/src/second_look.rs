@@ -1,6 +1,7 @@
 //! Steps 1 and 4 once more, for places that the robot left long ago: where names came late, they may
 //! still propose edges; where names were taken back, the revisits that they had led to are judged again.
 
+use crate::config::Rules;
 use crate::effects::{EdgeKind, Effects};
 use crate::filter::Filter;
 use crate::graph::Vertex;
@@ -22,8 +23,11 @@ const PAIRS_MAX: usize = 2;
 
 impl Filter {
     /// Places whose names have changed wait for a second look. One not left yet needs none: its first is
-    /// to come.
+    /// to come. The paper gives none.
     pub(crate) fn named_anew(&mut self, places: impl IntoIterator<Item = Vertex>) {
+        if self.config.rules == Rules::Paper {
+            return;
+        }
         let left = self.graph.places().len() as Vertex;
         wait(&mut self.named_anew, places.into_iter().filter(|&v| v < left));
     }

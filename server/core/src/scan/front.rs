@@ -41,7 +41,7 @@ const VAGUE_M: f64 = 0.15;
 const VAGUE_RAD: f64 = 0.07;
 /// What each end of an increment, and the slow bend of the local map, add to it per root metre of
 /// path, as a multiple of the roughness. From simulated offices, where this is three to five times too wide
-/// (`--example drives -- coverage`), and a real log, where it just covers: clutter errs more than noise does.
+/// (example `drives` of the server), and a real log, where it just covers: clutter errs more than noise does.
 const BEND: Vector3<f64> = Vector3::new(0.2, 0.2, 0.05);
 
 /// A scan in the local map.

@@ -143,8 +143,8 @@ fn the_papers_rules_ground_once() {
 }
 
 /// Two laps in which only names propose loops, the same place called differently in each.
-fn named_apart(said: &[(usize, &str)]) -> Mapper {
-    let mut mapper = Mapper::new(Config { gamma_per_m2: 1e9, ..Config::default() });
+fn named_apart(rules: Rules, said: &[(usize, &str)]) -> Mapper {
+    let mut mapper = Mapper::new(Config { gamma_per_m2: 1e9, rules, ..Config::default() });
     run(&mut mapper, &events(&drive(2), &laser(), said));
     mapper.step(Event::Flush);
     mapper
@@ -159,13 +159,16 @@ fn names_that_come_late_propose_the_edge_between_two_visits_long_past() {
     let lap = drive(2).len() / 2;
     let said = [(40, "this is the kitchen"), (lap + 40, "this is the bistro")];
     let late = (lap + 200, "the kitchen is also called the bistro");
-    assert_eq!(edges(&named_apart(&said)), 0);
-    let mapper = named_apart(&[said[0], said[1], late]);
+    assert_eq!(edges(&named_apart(Rules::Toponym, &said)), 0);
+    let mapper = named_apart(Rules::Toponym, &[said[0], said[1], late]);
     assert!(edges(&mapper) > 0);
-    let mut desk = named_apart(&said);
-    assert!(mend(&mut desk, Command::Rename { from: "bistro".into(), to: "kitchen".into() }).is_ok());
-    desk.step(Event::Flush);
-    assert!(edges(&desk) > 0, "renamed at a desk");
+    for rules in [Rules::Toponym, Rules::Paper] {
+        let mut desk = named_apart(rules, &said);
+        let rename = Command::Rename { from: "bistro".into(), to: "kitchen".into() };
+        assert!(mend(&mut desk, rename).is_ok());
+        desk.step(Event::Flush);
+        assert_eq!(edges(&desk) > 0, rules == Rules::Toponym, "renamed at a desk");
+    }
 }
 
 #[test]

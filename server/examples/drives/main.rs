@@ -2,7 +2,7 @@
 //!
 //! ```sh
 //! toponym simulate drives/1 --plan PLAN.xml --lidar rplidar --people 4      # and so on
-//! cargo run --release -p toponym-core --example drives -- coverage drives/*
+//! cargo run --release -p toponym-server --example drives -- coverage drives/*
 //! ```
 //! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
 //!

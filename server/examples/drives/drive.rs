@@ -8,11 +8,11 @@ use nalgebra::Vector3;
 use serde_json::Value;
 use std::fs::{File, read_to_string};
 use std::path::Path;
-use toponym_core::event::{Laser, Odom, Scan, Setup, StampNs};
+use toponym_core::event::StampNs;
 use toponym_core::graph::Graph;
 use toponym_core::{Config, Effect, Event, Mapper, Pose2};
-use toponym_proto::Message;
 use toponym_proto::record::RecordReader;
+use toponym_server::convert::event;
 
 /// Places without loops, and where they are.
 pub struct Drive {
@@ -33,12 +33,10 @@ impl Drive {
         let mut mapper = Mapper::new(Config { particles: 1, loops: false, ..Config::default() });
         let mut placed: Vec<Vec<Pose2>> = Vec::new();
         for message in RecordReader::new(File::open(folder.join("sim.rec")).unwrap()).unwrap() {
-            if let Some(event) = event(message.unwrap().1) {
-                for effect in mapper.step(event) {
-                    if let Effect::ScanPlaced { stamp_ns, place, place_from_body, .. } = effect {
-                        placed.resize(placed.len().max(place as usize + 1), Vec::new());
-                        placed[place as usize].push(at(&rows, stamp_ns).compose(&place_from_body.inverse()));
-                    }
+            for effect in mapper.step(event(message.unwrap().1)) {
+                if let Effect::ScanPlaced { stamp_ns, place, place_from_body, .. } = effect {
+                    placed.resize(placed.len().max(place as usize + 1), Vec::new());
+                    placed[place as usize].push(at(&rows, stamp_ns).compose(&place_from_body.inverse()));
                 }
             }
         }
@@ -64,41 +62,4 @@ fn at(rows: &[[f64; 4]], stamp_ns: StampNs) -> Pose2 {
 fn mean(poses: &[Pose2]) -> Pose2 {
     let off: Vector3<f64> = poses.iter().map(|p| poses[0].between(p).log()).sum();
     poses[0].compose(&Pose2::exp(&(off / poses.len() as f64)))
-}
-
-/// What the core takes of a robot's streams.
-fn event(message: Message) -> Option<Event> {
-    Some(match message {
-        Message::Setup(m) => Event::Setup(Setup {
-            robot: m.header.robot,
-            lasers: m
-                .lasers
-                .into_iter()
-                .map(|l| Laser {
-                    id: l.id,
-                    body_from_laser: Pose2::new(l.x_m, l.y_m, l.yaw_rad),
-                    upside_down: l.upside_down,
-                    range_min_m: l.range_min_m,
-                    range_max_m: l.range_max_m,
-                    ignored_rad: l.ignored_rad,
-                })
-                .collect(),
-        }),
-        Message::Odom(m) => Event::Odom(Odom {
-            robot: m.header.robot,
-            boot: m.header.boot,
-            stamp_ns: m.header.stamp.ns,
-            odom_from_body: Pose2::new(m.odom_from_body.x_m, m.odom_from_body.y_m, m.odom_from_body.yaw_rad),
-        }),
-        Message::Scan(m) => Event::Scan(Scan {
-            robot: m.header.robot,
-            laser: m.laser,
-            stamp_ns: m.header.stamp.ns,
-            angle_min_rad: m.angle_min_rad,
-            angle_increment_rad: m.angle_increment_rad,
-            time_increment_s: m.time_increment_s,
-            ranges_m: m.ranges_m,
-        }),
-        _ => return None,
-    })
 }
