@@ -3,8 +3,10 @@
 //! One step per place, when the robot has left it. Particles hold p(G, X, L | z, u, λ) =
 //! p(L | X, G, z, u, λ) · p(X | G, z, u, λ) · p(G | z, u, λ), eq. (2).
 
+use crate::chance::log_looks;
 use crate::config::Config;
-use crate::effects::{Effect, Effects};
+use crate::decide::{Choice, add_edge, choose};
+use crate::effects::{EdgeKind, Effect, Effects};
 use crate::geometry::Pose2;
 use crate::graph::{Graph, Vertex};
 use crate::inject::inject;
@@ -12,15 +14,20 @@ use crate::ledger::Ledger;
 use crate::loops::{Fit, Loops, Measured};
 use crate::particle::Particle;
 use crate::propose::{Proposal, propose};
-use crate::resample::{effective_sample_size, merge, normalise, resample};
+use crate::resample::{effective_sample_size, is_wasteful, merge, normalise, resample};
+use crate::revisit::{Revisits, Testimony};
 use crate::scan::front::{Chain, FrozenPlace};
 use crate::smoothing::{FactorId, SmoothError, Structure};
-use crate::weigh::{Choice, Judgement, add_edge, choose, judge};
+use crate::weigh::{Judgement, judge};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
+
+/// Edges of a place that tell no particle anything new: they are measurements still, but who comes for the
+/// tenth time needs no nine of them.
+const KNOWN_MAX: usize = 2;
 
 /// The posterior over semantic graphs, and what all particles share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -36,6 +43,7 @@ pub struct Filter {
     /// Distinct particles, best first; weights sum to one.
     pub particles: Vec<Particle>,
     loops: Loops,
+    revisits: Revisits,
     /// Factors that some particles hold and others don't.
     pub(crate) disputed: Vec<FactorId>,
     /// Places named anew since they were left, oldest first; see [`crate::second_look`].
@@ -53,6 +61,7 @@ impl Filter {
             structure: Arc::default(),
             particles,
             loops: Loops::default(),
+            revisits: Revisits::default(),
             disputed: Vec::new(),
             named_anew: VecDeque::new(),
         }
@@ -72,7 +81,7 @@ impl Filter {
         self.particles = merge(std::mem::take(&mut self.particles));
         let size = effective_sample_size(&self.particles);
         let n = self.config.particles.max(1);
-        if size < self.config.resample_below * f64::from(n) || self.particles.len() > n as usize {
+        if is_wasteful(&self.particles, n, self.config.resample_below) {
             self.particles = resample(std::mem::take(&mut self.particles), n, self.config.seed, t);
             effects.push(Effect::Resampled { effective_sample_size: size });
         }
@@ -146,25 +155,48 @@ impl Filter {
     pub(crate) fn weigh_measured(&mut self, t: Vertex, mut measured: Measured) -> Effects {
         inject(&self.config, t, &mut measured.fits);
         let mut effects = refusals(t, &measured);
-        effects.extend(measured.fits.iter().map(|fit| self.take_or_refuse(t, fit)));
+        let (fits, mut known) = (measured.fits.len(), 0);
+        for fit in &measured.fits {
+            let testimony = self.revisits.see(&self.graph, fit, t, log_looks(fit, fits));
+            let judged = self.judge(t, fit, &testimony); // (17–18)
+            let to_all = judged.iter().all(|j| j.is_some_and(|j| j.known));
+            known += usize::from(to_all && fit.kind != EdgeKind::Semantic);
+            effects.push(match known {
+                0..=KNOWN_MAX => self.take_or_refuse(t, fit, &testimony, &judged),
+                _ => surplus(t, fit),
+            });
+        }
+        for p in &mut self.particles {
+            p.refused.retain(|&id| self.revisits.remembers(id));
+        }
         effects
     }
 
-    /// Each particle takes the edge of a fit or refuses it, and is weighed by the fit.
-    fn take_or_refuse(&mut self, t: Vertex, fit: &Fit) -> Effect {
+    fn judge(&self, t: Vertex, fit: &Fit, testimony: &Testimony) -> Vec<Option<Judgement>> {
         let (structure, config) = (&self.structure, &self.config);
-        let judge = |p: &Particle| judge(structure, p, fit, t, config.gamma_per_m2);
-        let judged: Vec<Option<Judgement>> = self.particles.par_iter().map(judge).collect(); // (17–18)
+        let judge = |p: &Particle| judge(structure, p, fit, t, testimony, config.gamma_per_m2);
+        self.particles.par_iter().map(judge).collect()
+    }
+
+    /// Each particle takes the edge of a fit or refuses it, and is weighed by the fit.
+    fn take_or_refuse(
+        &mut self,
+        t: Vertex,
+        fit: &Fit,
+        testimony: &Testimony,
+        judged: &[Option<Judgement>],
+    ) -> Effect {
         let relief = judged.iter().flatten().map(|j| j.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-        let draw = |k| (config.seed, k as u64);
+        let draw = |k| (self.config.seed, k as u64);
         let mut choices: Vec<Choice> = std::mem::take(&mut self.particles)
             .into_iter()
-            .zip(&judged)
+            .zip(judged)
             .enumerate()
-            .map(|(k, (p, judgement))| choose(p, fit, *judgement, relief, t, draw(k)))
+            .map(|(k, (p, judgement))| choose(p, fit, testimony.revisit, *judgement, relief, t, draw(k)))
             .collect(); // G and w
         let wanted = choices.iter().any(|c| c.taken.is_some());
-        let edge = wanted.then(|| add_edge(Arc::make_mut(&mut self.structure), fit, t)).flatten();
+        let edge =
+            wanted.then(|| add_edge(Arc::make_mut(&mut self.structure), fit, testimony.revisit, t)).flatten();
         self.disputed.extend(edge.iter().map(|e| e.factor));
         choices.par_iter_mut().for_each(|c| c.take(&self.structure, edge.as_ref())); // X, (10)
         let share = share_taken(&choices);
@@ -210,6 +242,11 @@ fn report(t: Vertex, fit: &Fit, weight: f64, best: Option<&Judgement>) -> Effect
     }
 }
 
+fn surplus(t: Vertex, fit: &Fit) -> Effect {
+    let reason = format!("edge {t}–{} left out: all know it, and {KNOWN_MAX} others say it", fit.i);
+    Effect::EdgeRefused { i: fit.i.into(), j: t.into(), kind: fit.kind, reason }
+}
+
 fn refusals(t: Vertex, measured: &Measured) -> Effects {
     measured
         .refused
@@ -222,7 +259,9 @@ fn refusals(t: Vertex, measured: &Measured) -> Effects {
 mod tests {
     use super::*;
     use crate::effects::EdgeKind;
+    use crate::scan::front::OpenPlace;
     use crate::scan::matching::Mode;
+    use crate::scan::place::Content;
     use nalgebra::Vector3;
 
     /// A straight chain of places 1 m apart whose ends fit so that half of the posterior believes it.
@@ -231,10 +270,33 @@ mod tests {
         for _ in 0..21 {
             filter.extend(&chain());
         }
-        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
-        let mode = Mode { i_from_j: Pose2::new(17.7, 0.0, 0.0), covariance, score: 0.9, overlap: 0.6 };
-        filter.take_or_refuse(20, &Fit::supported_by(0, mode, EdgeKind::Distance, 3));
+        let fits = vec![fit(0, 17.7, EdgeKind::Distance)];
+        filter.weigh_measured(20, Measured { fits, refused: vec![] });
         filter
+    }
+
+    #[test]
+    fn of_what_all_know_two_edges_a_place_are_enough() {
+        let mut filter = Filter::new(Config { loops: false, ..Config::default() });
+        for v in 0_u32..21 {
+            let front_from_place = Pose2::new(f64::from(v), 0.0, 0.0);
+            let (id, path_m, chain) = (v.into(), f64::from(v), chain());
+            let open = OpenPlace { id, stamp_ns: 0, front_from_place, path_m, chain };
+            filter.step(FrozenPlace { open, content: Content::new(&[]) });
+        }
+        let fits: Vec<Fit> = (16..20).map(|i| fit(i, f64::from(20 - i), EdgeKind::Distance)).collect();
+        let effects = filter.weigh_measured(20, Measured { fits, refused: vec![] });
+        let taken = effects.iter().filter(|e| matches!(e, Effect::EdgeAccepted { .. })).count();
+        assert_eq!((effects.len(), taken, filter.best().edges.len()), (4, 2, 2));
+        let said = vec![fit(15, 5.0, EdgeKind::Semantic)];
+        filter.weigh_measured(20, Measured { fits: said, refused: vec![] });
+        assert_eq!(filter.best().edges.len(), 3, "words are said once");
+    }
+
+    fn fit(i: Vertex, x_m: f64, kind: EdgeKind) -> Fit {
+        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
+        let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score: 0.9, overlap: 0.6 };
+        Fit::supported_by(i, mode, kind, 3)
     }
 
     fn chain() -> Chain {

@@ -12,7 +12,9 @@
 //! a pose is ordered x, y, yaw; covariances of poses are those of the right perturbation
 //! `X·exp(δ)`, i.e. they live in the body's frame.
 
+pub mod chance;
 pub mod config;
+pub mod decide;
 mod describe;
 pub mod effects;
 pub mod event;
@@ -35,6 +37,7 @@ pub mod propose;
 pub mod query;
 pub mod random;
 pub mod resample;
+pub mod revisit;
 pub mod scan;
 mod second_look;
 pub mod smoothing;

@@ -24,18 +24,19 @@ const OVERLAP_MIN: f64 = 0.25;
 /// anywhere there.
 const SIGMA_MAX_M: f64 = 0.12;
 /// Places that must agree before a loop counts …
-const SUPPORT_MIN: u32 = 3;
+pub const SUPPORT_MIN: u32 = 3;
 /// … over so much path.
 const SUPPORT_PATH_M: f64 = 5.0;
 /// Path between the places asked for agreement.
 const SUPPORT_STEP_M: f64 = 2.5;
 /// How far along the old path the match for the next place is looked for.
-const FOLLOW_REACH_M: f64 = 6.0;
+pub const FOLLOW_REACH_M: f64 = 6.0;
 /// A followed place must lie so near to a place of the old path.
 const FOLLOW_NEAR_M: f64 = 3.0;
 /// Fits so near to what the front end predicts agree with it.
-const AGREE_M: f64 = 0.3;
-const AGREE_RAD: f64 = 0.06;
+pub const AGREE_M: f64 = 0.3;
+/// The same for headings.
+pub const AGREE_RAD: f64 = 0.06;
 /// Fits followed at a time.
 const FOLLOWED_MAX: usize = 8;
 /// Fits without enough support that are looked into at a time, the best first.

@@ -69,7 +69,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 5 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 6 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -382,6 +382,7 @@ mod tests {
             kind: EdgeKind::Distance,
             i_from_j: Pose2::default(),
             covariance: Matrix3::identity(),
+            revisit: 0,
             named: None,
             factor: 0,
         };

@@ -4,9 +4,11 @@ use crate::effects::EdgeKind;
 use crate::geometry::Pose2;
 use crate::graph::Vertex;
 use crate::labels::Labels;
+use crate::revisit::RevisitId;
 use crate::smoothing::{Belief, FactorId, SmoothError, Structure};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// An edge says that two places are one only if they lie this near; scans tie farther ones too.
@@ -25,6 +27,8 @@ pub struct Edge {
     pub i_from_j: Pose2,
     /// Covariance of it, right perturbation.
     pub covariance: Matrix3<f64>,
+    /// The revisit that it is of.
+    pub revisit: RevisitId,
     /// The pair (older, newer) whose names led to the revisit, if any did.
     pub named: Option<(Vertex, Vertex)>,
     /// Its factor in the structure that all particles share.
@@ -39,6 +43,10 @@ const SAID_MAX: usize = 64;
 pub struct Particle {
     /// G: loop edges in the order they were added.
     pub edges: Arc<Vec<Edge>>,
+    /// The revisits that G's loop edges are of, in order.
+    pub taken: Arc<Vec<RevisitId>>,
+    /// Revisits of late that were decided against.
+    pub refused: Vec<RevisitId>,
     /// X.
     pub belief: Belief,
     /// L.
@@ -58,6 +66,8 @@ impl Particle {
     pub fn empty(count: u32) -> Self {
         Self {
             edges: Arc::default(),
+            taken: Arc::default(),
+            refused: Vec::new(),
             belief: Belief::new(),
             labels: Labels::default(),
             said: Arc::default(),
@@ -73,6 +83,9 @@ impl Particle {
         if edge.i_from_j.x_m.hypot(edge.i_from_j.y_m) < SAME_PLACE_M {
             self.labels.carry_over(edge.i, edge.j);
         }
+        if let Err(at) = self.taken.binary_search(&edge.revisit) {
+            Arc::make_mut(&mut self.taken).insert(at, edge.revisit);
+        }
         Arc::make_mut(&mut self.edges).push(edge);
     }
 
@@ -83,6 +96,8 @@ impl Particle {
             self.belief.release(edge.factor);
             self.labels.carry_back(edge.i, edge.j);
         }
+        let taken: BTreeSet<RevisitId> = kept.iter().map(|e| e.revisit).collect();
+        self.taken = Arc::new(taken.into_iter().collect());
         self.edges = Arc::new(kept);
     }
 
@@ -124,15 +139,37 @@ impl Particle {
         self.log_weight.exp()
     }
 
-    /// Whether two are the same graph with the same measurements.
+    /// Whether two believe in the same revisits. Which of a revisit's fits became edges is no difference.
     pub fn same_graph(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.edges, &other.edges) || self.edges == other.edges
+        Arc::ptr_eq(&self.taken, &other.taken) || self.taken == other.taken
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_revisit_is_taken_while_one_of_its_edges_is_held() {
+        let mut p = Particle::empty(1);
+        for (factor, revisit) in [4, 2, 4].into_iter().enumerate() {
+            p.take(Edge {
+                i: 0,
+                j: 9,
+                kind: EdgeKind::Distance,
+                i_from_j: Pose2::default(),
+                covariance: Matrix3::identity(),
+                revisit,
+                named: None,
+                factor: factor as FactorId,
+            });
+        }
+        assert_eq!(p.taken[..], [2, 4]);
+        p.give_up(|e| e.factor == 0);
+        assert_eq!(p.taken[..], [2, 4]);
+        p.give_up(|e| e.revisit == 4);
+        assert_eq!(p.taken[..], [2]);
+    }
 
     #[test]
     fn a_sentence_taken_back_takes_its_weight_along_and_no_other() {

@@ -19,7 +19,7 @@ const LOOKED_AT_MAX: usize = 5;
 /// Places proposed are so far apart along the path: their content overlaps otherwise.
 const SPREAD_M: f64 = 2.0;
 /// Beyond, two places' scans hardly overlap, and eq. (6) is small.
-const NEAR_M: f64 = 10.0;
+pub const NEAR_M: f64 = 10.0;
 /// Position uncertainty at which the robot counts as lost.
 pub const LOST_SIGMA_M: f64 = 10.0;
 /// Probability of an edge to any place looked at, when lost.
@@ -166,7 +166,7 @@ fn merge_semantic(
 ///
 /// A near place that is not drawn now is drawn from the next place, a metre on. A name is said
 /// once: there each of the equal particles draws for itself.
-fn draw(seed: u64, graph: &Graph, t: Vertex, count: u32, proposals: Vec<Proposal>) -> Vec<Proposal> {
+pub fn draw(seed: u64, graph: &Graph, t: Vertex, count: u32, proposals: Vec<Proposal>) -> Vec<Proposal> {
     let any_of = |p: &Proposal| match p.kind {
         EdgeKind::Semantic => 1.0 - (1.0 - p.probability).powi(count as i32),
         EdgeKind::Distance | EdgeKind::Relocalisation => p.probability,

@@ -10,6 +10,9 @@ use crate::random::{Purpose, generator};
 use rand::RngExt;
 use std::sync::Arc;
 
+/// Lighter ones are left to the draw: hardly ever does one become likely again.
+const NEGLIGIBLE: f64 = 1e-4;
+
 /// Scales weights to sum to one.
 pub fn normalise(particles: &mut [Particle]) {
     let top = particles.iter().map(|p| p.log_weight).fold(f64::NEG_INFINITY, f64::max);
@@ -21,8 +24,9 @@ pub fn normalise(particles: &mut [Particle]) {
 }
 
 /// Makes one of equal particles, and puts the best first.
-pub fn merge(particles: Vec<Particle>) -> Vec<Particle> {
+pub fn merge(mut particles: Vec<Particle>) -> Vec<Particle> {
     let mut merged: Vec<Particle> = Vec::with_capacity(particles.len());
+    particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
     for p in particles {
         if let Some(same) = merged.iter_mut().find(|m| m.same_graph(&p)) {
             same.log_weight = log_add(same.log_weight, p.log_weight);
@@ -44,6 +48,14 @@ fn log_add(a: f64, b: f64) -> f64 {
 /// 1 / Σ w² over single particles.
 pub fn effective_sample_size(particles: &[Particle]) -> f64 {
     1.0 / particles.iter().map(|p| p.weight().powi(2) / f64::from(p.count)).sum::<f64>()
+}
+
+/// Whether particles cost more than they tell: few weigh much, there are more graphs than particles, or one
+/// is lighter than [`NEGLIGIBLE`].
+pub fn is_wasteful(particles: &[Particle], n: u32, resample_below: f64) -> bool {
+    effective_sample_size(particles) < resample_below * f64::from(n)
+        || particles.len() > n as usize
+        || particles.iter().any(|p| p.weight() < NEGLIGIBLE)
 }
 
 /// Gives each distinct graph its share of the `n` particles. Graphs that weigh at least one
@@ -114,10 +126,18 @@ mod tests {
                 kind: EdgeKind::Distance,
                 i_from_j: Pose2::default(),
                 covariance: nalgebra::Matrix3::identity(),
+                revisit: k as u32,
                 named: None,
                 factor: k as u32,
             };
-            Particle { edges: Arc::new(vec![edge]), log_weight: f64::ln(weight), count, ..Particle::empty(1) }
+            let taken = Arc::new(vec![edge.revisit]);
+            Particle {
+                edges: Arc::new(vec![edge]),
+                taken,
+                log_weight: f64::ln(weight),
+                count,
+                ..Particle::empty(1)
+            }
         };
         weights.iter().enumerate().map(one).collect()
     }
@@ -151,9 +171,28 @@ mod tests {
     }
 
     #[test]
+    fn which_fits_of_a_revisit_became_edges_is_no_difference() {
+        let mut all = particles(&[(0.2, 3), (0.8, 4)]);
+        all[0].taken = all[1].taken.clone();
+        let heavier = all[1].edges.clone();
+        let merged = merge(all);
+        assert_eq!((merged.len(), &merged[0].edges), (1, &heavier));
+        assert_eq!(total(&merged).1, 7);
+    }
+
+    #[test]
     fn effective_sample_size_counts_particles() {
         assert!((effective_sample_size(&particles(&[(0.5, 5), (0.5, 5)])) - 10.0).abs() < 1e-9);
         assert!((effective_sample_size(&particles(&[(1.0, 1), (1e-9, 9)])) - 1.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn particles_are_drawn_when_few_weigh_much_or_one_next_to_nothing() {
+        let wasteful = |weights: &[(f64, u32)]| is_wasteful(&particles(weights), 10, 0.5);
+        assert!(!wasteful(&[(0.6, 6), (0.4, 4)]));
+        assert!(wasteful(&[(0.97, 1), (0.03, 9)]));
+        assert!(wasteful(&[(1.0 - 1e-5, 9), (1e-5, 1)]));
+        assert!(wasteful(&[(1.0 / 11.0, 1); 11]));
     }
 
     #[test]

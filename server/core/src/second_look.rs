@@ -1,6 +1,7 @@
 //! Steps 1 and 4 once more, for places that the robot left long ago: where names came late, they may
 //! still propose edges; where names were taken back, the revisits that they had led to are judged again.
 
+use crate::chance::log_looks;
 use crate::config::Rules;
 use crate::effects::{EdgeKind, Effects};
 use crate::filter::Filter;
@@ -10,7 +11,7 @@ use crate::loops::{Fit, measure_again};
 use crate::particle::Particle;
 use crate::propose::{Proposal, SIMILARITY_MIN, propose_named};
 use crate::smoothing::Structure;
-use crate::weigh::judge;
+use crate::weigh::judge_alone;
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
@@ -142,8 +143,11 @@ fn without(
     let mut without = particle.clone();
     without.give_up(|e| e.named == Some(pair));
     without.update(structure).ok()?;
-    let would =
-        |fit: &Fit| judge(structure, &without, fit, pair.1, gamma_per_m2).is_some_and(|j| j.posterior > 0.5);
+    let would = |fit: &Fit| {
+        let log_looks = log_looks(fit, fits.len());
+        judge_alone(structure, &without, fit, pair.1, log_looks, gamma_per_m2)
+            .is_some_and(|j| j.posterior > 0.5)
+    };
     (!fits.iter().any(would)).then_some(without)
 }
 
@@ -158,10 +162,10 @@ pub(crate) fn gained(before: &[Evidence], after: &[Evidence]) -> Vec<Vertex> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::decide::add_edge;
     use crate::geometry::Pose2;
     use crate::labels::{Labels, Source};
     use crate::scan::matching::Mode;
-    use crate::weigh::add_edge;
     use nalgebra::{Matrix3, Vector3};
 
     /// A chain of 21 places 1 m apart and a fit of its ends at `x_m`, taken because both were called alike.
@@ -179,7 +183,7 @@ mod tests {
         let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
         let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score: 0.9, overlap: 0.6 };
         let fit = Fit::supported_by(0, mode, EdgeKind::Semantic, 3);
-        p.take(add_edge(&mut structure, &fit, 20).unwrap());
+        p.take(add_edge(&mut structure, &fit, 0, 20).unwrap());
         p.update(&structure).unwrap();
         (structure, p, fit)
     }

@@ -18,6 +18,8 @@ use toponym_server::convert::event;
 pub struct Drive {
     /// Its folder.
     pub name: String,
+    /// Tells buildings apart.
+    pub building: String,
     /// Places and the chain between them.
     pub graph: Graph,
     /// World from place, by vertex.
@@ -43,6 +45,7 @@ impl Drive {
         mapper.step(Event::Flush);
         Self {
             name: folder.display().to_string(),
+            building: truth["regions"].to_string(),
             truth: placed.iter().map(|poses| mean(poses)).collect(),
             graph: mapper.graph().clone(),
         }

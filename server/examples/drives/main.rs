@@ -2,23 +2,28 @@
 //!
 //! ```sh
 //! toponym simulate drives/1 --plan PLAN.xml --lidar rplidar --people 4      # and so on
+//! cargo run --release -p toponym-server --example drives -- chance drives/*
 //! cargo run --release -p toponym-server --example drives -- coverage drives/*
 //! ```
+//! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
+//! shows on buildings not learned from how often fits are true that are called so with some probability.
 //! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
 //!
 //! A drive is a folder with `sim.rec` and `truth.json`, as `toponym simulate` makes them. Any log will do:
 //! `toponym-server serve --record` makes the one, `trajectory` rows `[t, x, y, yaw]` are the other.
 #![allow(clippy::unwrap_used, reason = "a tool: a wrong file ends it")]
 
+mod chance;
 mod coverage;
 mod drive;
+mod logistic;
 
 use clap::{Parser, Subcommand};
 use drive::Drive;
 use std::path::PathBuf;
 
 #[derive(Parser)]
-#[command(about = "Checks by simulated drives what increments are worth")]
+#[command(about = "Learns from simulated drives, and checks by them, what fits and increments are worth")]
 struct Args {
     #[command(subcommand)]
     what: What,
@@ -26,6 +31,12 @@ struct Args {
 
 #[derive(Subcommand)]
 enum What {
+    /// How much likelier a true fit is than one by chance, and how well p(e = 1) is calibrated.
+    Chance {
+        /// Folders.
+        #[arg(required = true)]
+        drives: Vec<PathBuf>,
+    },
     /// Share of increments of the front end whose 95 % region covers the truth.
     Coverage {
         /// Folders.
@@ -36,6 +47,10 @@ enum What {
 
 fn main() {
     match Args::parse().what {
+        What::Chance { drives } => {
+            let drives: Vec<Drive> = drives.iter().map(|d| Drive::read(d)).collect();
+            chance::report(&drives);
+        }
         What::Coverage { drives } => drives.iter().for_each(|d| coverage::report(&Drive::read(d))),
     }
 }
