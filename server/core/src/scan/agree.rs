@@ -75,9 +75,16 @@ pub fn agreement(a: &Content, b: &Content, a_from_b: &Pose2, look: &Look) -> Agr
 }
 
 fn look_up(sample: &[Point], views: &[View], views_from_sample: &Pose2, look: &Look, sum: &mut Agreement) {
+    let votes = votes(sample, views, views_from_sample, look);
+    sum.points += votes.len() as u32;
+    sum.agree += votes.iter().filter(|v| **v > 0).count() as u32;
+    sum.conflict += votes.iter().filter(|v| **v < 0).count() as u32;
+}
+
+/// For each of some points the views that saw it, less those that saw through where it would be.
+pub fn votes(sample: &[Point], views: &[View], views_from_sample: &Pose2, look: &Look) -> Vec<i32> {
     let every = |n: usize, most: usize| n.div_ceil(most).max(1);
     let points: Vec<&Point> = sample.iter().step_by(every(sample.len(), look.points_max)).collect();
-    // Views that saw the point, less those that saw through where it would be.
     let mut votes = vec![0i32; points.len()];
     for view in views.iter().step_by(every(views.len(), look.views_max)) {
         let laser_from_sample = view.place_from_laser.inverse().compose(views_from_sample);
@@ -102,7 +109,5 @@ fn look_up(sample: &[Point], views: &[View], views_from_sample: &Pose2, look: &L
             }
         }
     }
-    sum.points += points.len() as u32;
-    sum.agree += votes.iter().filter(|v| **v > 0).count() as u32;
-    sum.conflict += votes.iter().filter(|v| **v < 0).count() as u32;
+    votes
 }

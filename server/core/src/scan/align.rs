@@ -14,6 +14,7 @@
 //! prior may be given more weight than elsewhere.
 
 use super::cloud::{Nearest, Point, Surfaces};
+use super::weak::Weak;
 use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
 
@@ -34,13 +35,10 @@ const PAIRS_MIN: usize = 10;
 const STILL_M: f64 = 3e-4;
 const STILL_RAD: f64 = 5e-5;
 
-/// Where the least known direction of translation has less than this share of the information in the
-/// best known, normals' noise may be most of it …
-const WEAK_SHARE: f64 = 0.1;
-/// … and as the share goes to nothing, components of normals up to this are taken for noise. Fitted
-/// to some centimetres of wall, they are turned by several degrees by a centimetre's noise of ranges,
-/// with tails. Both from simulated corridors: twice or half the one, .25 of the other do alike.
-const NORMAL_NOISE: f64 = 0.35;
+/// How far a source is slid to see what noise says: farther than the gate, and than jambs are deep.
+const SLID_M: [f64; 8] = [-0.8, -0.6, -0.4, -0.2, 0.2, 0.4, 0.6, 0.8];
+/// Noise says so many standard deviations more than its mean at most.
+const NOISE_SIGMAS: f64 = 3.0;
 
 /// A Gaussian on the transform sought.
 #[derive(Clone, Copy, Debug)]
@@ -125,43 +123,28 @@ pub fn align(
     })
 }
 
-/// A direction of translation of which the pairs say little, source's frame.
-#[derive(Clone, Copy, Debug)]
-struct Weak {
-    /// Unit.
-    x: f64,
-    y: f64,
-    /// How weak it is, 0 … 1.
-    share: f64,
-    /// Square of the component along it that noise may give a normal.
-    noise2: f64,
-}
-
-impl Weak {
-    /// The least known direction of translation, if it is known far less than the one across it.
-    fn of(information: &Matrix3<f64>) -> Option<Self> {
-        let (xx, xy, yy) = (information[(0, 0)], information[(0, 1)], information[(1, 1)]);
-        let (mean, half) = (f64::midpoint(xx, yy), (0.5 * (xx - yy)).hypot(xy));
-        let share = (mean - half) / (mean + half);
-        // The best known direction is at half the angle of (xx − yy, 2 xy), the least is across.
-        let (s, c) = (0.5 * (2.0 * xy).atan2(xx - yy)).sin_cos();
-        let weak = 1.0 - share / WEAK_SHARE;
-        (share < WEAK_SHARE).then_some(Self { x: -s, y: c, share: weak, noise2: NORMAL_NOISE.powi(2) * weak })
-    }
-
-    /// A unit normal less what noise may have given it along the direction; unit again.
-    fn denoised(&self, (a, b): (f64, f64)) -> (f64, f64) {
-        let (along, across) = (a * self.x + b * self.y, b * self.x - a * self.y);
-        let kept = along * (1.0 - self.noise2 / (along * along).max(self.noise2));
-        let rest = (1.0 - kept * kept).max(0.0).sqrt().copysign(across);
-        (kept * self.x - rest * self.y, kept * self.y + rest * self.x)
-    }
-
-    /// A normal less its component along the direction, the more the weaker that is.
-    fn damped(&self, (a, b): (f64, f64)) -> (f64, f64) {
-        let off = (a * self.x + b * self.y) * self.share;
-        (a - off * self.x, b - off * self.y)
-    }
+/// The information of an alignment less what is noise: where the pairs are weak in a direction, they say as
+/// much with the source slid along it. Along a bare corridor nothing is left; a door's jambs, which meet
+/// nothing when slid, keep theirs.
+pub fn sound_information(
+    source: &[Point],
+    target: &impl Surfaces,
+    found: &Alignment,
+    gate_m: f32,
+) -> Matrix3<f64> {
+    let information = found.information;
+    let Some(weak) = Weak::of(&information) else { return information };
+    let u = Vector3::new(weak.x, weak.y, 0.0);
+    let along = |slid_m: f64| {
+        let x = found.target_from_source.compose(&Pose2::new(slid_m * weak.x, slid_m * weak.y, 0.0));
+        (u.transpose() * linearise(source, 1, target, &x, gate_m, Some(weak)).information * u).x
+    };
+    let (here, slid) = (along(0.0), SLID_M.map(along));
+    let mean = slid.iter().sum::<f64>() / slid.len() as f64;
+    let variance = slid.iter().map(|v| (v - mean).powi(2)).sum::<f64>() / slid.len() as f64;
+    let sound = (1.0 - (mean + NOISE_SIGMAS * variance.sqrt()) / here.max(1e-9)).max(0.0);
+    let keep = Matrix3::identity() - u * u.transpose() * (1.0 - sound.sqrt());
+    keep * information * keep
 }
 
 struct Fit {
@@ -340,6 +323,32 @@ mod tests {
         let found = align(&source, &fresh, &Pose2::default(), None, 0.6).unwrap();
         let off = truth.between(&found.target_from_source);
         assert!(off.x_m.hypot(off.y_m) < 1e-3 && off.yaw_rad.abs() < 1e-3, "{off:?}");
+    }
+
+    /// How much of the information along x of a cloud laid on itself, .4 m off, is sound.
+    fn sound_share(cloud: &[Point], guess_m: f64) -> f64 {
+        let (source, index) = (near(cloud), Index::new(cloud, 0.6));
+        let found = align(&source, &index, &Pose2::new(guess_m, 0.0, 0.0), None, 0.25).unwrap();
+        let sound = sound_information(&source, &index, &found, 0.0625);
+        assert!((sound[(1, 1)] / found.information[(1, 1)] - 1.0).abs() < 0.05, "across it all is");
+        assert!(sound.symmetric_eigenvalues().min() > -1e-6);
+        sound[(0, 0)] / found.information[(0, 0)]
+    }
+
+    #[test]
+    fn what_is_said_wherever_one_slides_along_a_corridor_is_noise() {
+        // Some normals are turned by far more than is taken for noise.
+        let turned = |(k, p): (usize, Point)| {
+            let (s, c) = if k % 7 == 0 { (0.9 * (k as f32 * 1.3).sin()).sin_cos() } else { (0.0, 1.0) };
+            Point { nx: c * p.nx - s * p.ny, ny: s * p.nx + c * p.ny, ..p }
+        };
+        let walls = wall(-8.0, -1.0, 8.0, -1.0).chain(wall(8.0, 1.0, -8.0, 1.0));
+        let mut corridor: Vec<Point> = walls.enumerate().map(turned).collect();
+        assert!(sound_share(&corridor, 0.4) < 0.1, "{}", sound_share(&corridor, 0.4));
+        for x in [2.0, 3.0] {
+            corridor.extend(wall(x, 1.0, x, 1.5).chain(wall(x + 0.9, 1.5, x + 0.9, 1.0)));
+        }
+        assert!(sound_share(&corridor, 0.05) > 0.5, "{}", sound_share(&corridor, 0.05));
     }
 
     #[test]

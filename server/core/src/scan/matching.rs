@@ -1,7 +1,7 @@
 //! Two places' scans to modes: the measurement z behind every loop edge.
 
 use super::agree::{Look, agreement};
-use super::align::align;
+use super::align::{align, sound_information};
 use super::cloud::{Index, Point};
 use super::correlate::{Raster, Source, search};
 use super::place::Content;
@@ -69,7 +69,8 @@ fn polish(i: &Content, index: &Index, j: &Content, coarse: &Pose2) -> Option<Mod
     // Along a bare corridor the information is all but singular: a metre's uncertainty or more.
     let weak = Matrix3::from_diagonal(&Vector3::new(0.04, 0.04, 1.0));
     let per_sample = j.sample.len() as f64 / some.len().max(1) as f64;
-    let covariance = (found.information * per_sample + weak).try_inverse()? + floor;
+    let information = sound_information(&some, index, &found, GATE_M / 8.0);
+    let covariance = (information * per_sample + weak).try_inverse()? + floor;
     let agreement = agreement(i, j, &found.target_from_source, &Look::CLOSE);
     Some(Mode {
         i_from_j: found.target_from_source,

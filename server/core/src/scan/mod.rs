@@ -3,6 +3,7 @@
 //! - [`sweep`]: one scan, de-skewed, as points with normals and as a range image.
 //! - [`cloud`]: sets of points and their spatial index.
 //! - [`align`]: point-to-line registration from a guess, with an information matrix.
+//! - `weak`: the direction of which a registration knows little, and noise that looks like knowledge.
 //! - [`correlate`]: prior-free search for all transforms under which two clouds overlap.
 //! - [`agree`]: do two places see each other's walls, or through them?
 //! - `local`: the surfaces of the last metres of path, kept as scans come and go.
@@ -20,4 +21,5 @@ mod local;
 pub mod matching;
 pub mod place;
 pub mod sweep;
+mod weak;
 mod wheels;
