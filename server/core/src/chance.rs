@@ -8,7 +8,7 @@ use crate::loops::{Fit, SUPPORT_MIN};
 
 /// Weights of [`looks`]. Learned by `--example drives -- chance` of the server from simulated drives with
 /// people about (`server/ARCHITECTURE.md`).
-pub const LOOKS: [f64; 4] = [2.47, -1.73, 2.08, -2.12];
+pub const LOOKS: [f64; 4] = [2.52, -2.75, 1.70, -2.28];
 /// Shares of contradicted points by which they are scaled, and below which they are not known to be.
 const CONTRADICTED: f64 = 0.1;
 const CONTRADICTED_MIN: f64 = 0.005;

@@ -197,7 +197,11 @@ fn supported(graph: &Graph, t: Vertex, fits: Vec<Fit>, measured: &mut Measured) 
 }
 
 fn good(mode: &Mode) -> bool {
-    mode.score >= SCORE_MIN && mode.overlap >= OVERLAP_MIN && sigma_max_m(mode) <= SIGMA_MAX_M
+    looks_alike(mode) && sigma_max_m(mode) <= SIGMA_MAX_M
+}
+
+fn looks_alike(mode: &Mode) -> bool {
+    mode.score >= SCORE_MIN && mode.overlap >= OVERLAP_MIN
 }
 
 /// Standard deviation of the translation in its least certain direction.
@@ -222,7 +226,7 @@ fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
     Some(Refusal { i: p.i, kind: p.kind, reason })
 }
 
-/// Matches the pairs that the memo does not know, some at a time, the likeliest first, until one fits:
+/// Matches the pairs that the memo does not know, some at a time, the likeliest first, until one looks alike:
 /// the others mostly show the same revisit. Words are said once: their pairs are all matched.
 fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
     let mut new: Vec<&Proposal> = proposals.iter().filter(|p| !graph.memo.contains_key(&(p.i, t))).collect();
@@ -242,7 +246,7 @@ fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
             .par_iter()
             .map(|p| (p.i, Matched { modes: modes(&graph.place(p.i).content, here, &source) }))
             .collect();
-        fitted |= found.iter().any(|(_, m)| m.modes.iter().any(good));
+        fitted |= found.iter().any(|(_, m)| m.modes.iter().any(looks_alike));
         graph.memo.extend(found.into_iter().map(|(i, m)| ((i, t), m)));
     }
 }
