@@ -19,5 +19,7 @@ pub mod front;
 mod local;
 pub mod matching;
 pub mod place;
+#[cfg(test)]
+pub mod rooms;
 pub mod sweep;
 mod wheels;
