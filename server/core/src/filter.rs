@@ -11,6 +11,7 @@ use crate::geometry::Pose2;
 use crate::graph::{Graph, Vertex};
 use crate::inject::inject;
 use crate::ledger::Ledger;
+use crate::likelihood::weigh_overlaps;
 use crate::loops::{Fit, Loops, Measured};
 use crate::particle::Particle;
 use crate::propose::{Proposal, propose};
@@ -76,6 +77,7 @@ impl Filter {
         let measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
         let mut effects = self.weigh_measured(t, measured); // 1, 2 and 4: G, X and w, (10), (17–18)
         effects.extend(self.look_again()); // the same for a place that was named since it was left
+        weigh_overlaps(&self.graph, &self.structure, &mut self.particles, t); // 4. w where nothing fitted, (18)
         self.reground(); // 3. L: edges carry labels over; descriptions are grounded in the map as it is now
         normalise(&mut self.particles);
         self.particles = merge(std::mem::take(&mut self.particles));

@@ -26,6 +26,7 @@ pub mod inject;
 pub mod labels;
 pub mod language;
 pub mod ledger;
+pub mod likelihood;
 pub mod listen;
 pub mod loops;
 pub mod mapper;

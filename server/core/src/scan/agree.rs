@@ -111,3 +111,27 @@ pub fn votes(sample: &[Point], views: &[View], views_from_sample: &Pose2, look: 
     }
     votes
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scan::rooms::{ROOM, content};
+
+    /// How a wall that faces the origin at (x, 0) compares with what was seen of the room from its middle.
+    fn wall_at(x: f32) -> Agreement {
+        let room = content(&ROOM, &Pose2::default());
+        let wall = Point { x, y: 0.0, nx: -1.0, ny: 0.0 };
+        let mut sum = Agreement::default();
+        look_up(&[wall], &room.views, &Pose2::default(), &Look::CLOSE, &mut sum);
+        sum
+    }
+
+    #[test]
+    fn a_wall_where_the_laser_saw_one_agrees_where_it_saw_through_it_does_not_and_behind_nobody_knows() {
+        let compared = |x| (wall_at(x).agree, wall_at(x).conflict);
+        assert_eq!(compared(5.1), (1, 0), "the room ends at 5 m");
+        assert_eq!(compared(3.0), (0, 1), "free floor");
+        assert_eq!(compared(7.0), (0, 0), "outside");
+        assert_eq!(wall_at(7.0).points, 1);
+    }
+}

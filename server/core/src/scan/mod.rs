@@ -20,6 +20,8 @@ pub mod front;
 mod local;
 pub mod matching;
 pub mod place;
+#[cfg(test)]
+pub mod rooms;
 pub mod sweep;
 mod weak;
 mod wheels;
