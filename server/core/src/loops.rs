@@ -41,8 +41,10 @@ pub const AGREE_RAD: f64 = 0.06;
 const FOLLOWED_MAX: usize = 8;
 /// Fits without enough support that are looked into at a time, the best first.
 const UNSUPPORTED_AT_ONCE: usize = 4;
-/// Pairs matched at a time.
+/// Pairs matched at a time …
 const MATCHED_AT_ONCE: usize = 2;
+/// … and for one place: particles that differ may propose many.
+const MATCHED_MAX: usize = 8;
 /// A fit that finds no support over so many places is dropped.
 const UNSUPPORTED_MAX: u32 = 8;
 
@@ -227,7 +229,7 @@ fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
 }
 
 /// Matches the pairs that the memo does not know, some at a time, the likeliest first, until one looks alike:
-/// the others mostly show the same revisit. Words are said once: their pairs are all matched.
+/// the others mostly show the same revisit. Words are said once: their pairs are matched first, and all.
 fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
     let mut new: Vec<&Proposal> = proposals.iter().filter(|p| !graph.memo.contains_key(&(p.i, t))).collect();
     if new.is_empty() {
@@ -235,6 +237,7 @@ fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
     }
     let said = |p: &Proposal| p.kind == EdgeKind::Semantic;
     new.sort_by(|a, b| said(b).cmp(&said(a)).then(b.probability.total_cmp(&a.probability)));
+    new.truncate(MATCHED_MAX);
     let source = Source::new(&graph.place(t).content.sample);
     let mut fitted = false;
     for some in new.chunks(MATCHED_AT_ONCE) {
@@ -355,7 +358,20 @@ fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::revisit::tests::straight;
     use nalgebra::Matrix3;
+
+    #[test]
+    fn a_place_is_matched_with_few_others_and_with_those_that_words_name_first() {
+        let mut graph = straight(60);
+        let proposal = |i: Vertex| {
+            let kind = if i == 3 { EdgeKind::Semantic } else { EdgeKind::Distance };
+            Proposal { i, kind, probability: 0.01 * f64::from(i) }
+        };
+        match_new(&mut graph, 59, &(0..20).map(proposal).collect::<Vec<_>>());
+        let matched: Vec<Vertex> = graph.memo.keys().map(|k| k.0).collect();
+        assert_eq!(matched, [3, 13, 14, 15, 16, 17, 18, 19]);
+    }
 
     #[test]
     fn the_first_edge_that_counts_of_a_revisit_by_words_is_theirs() {

@@ -79,7 +79,7 @@ impl Revisit {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::effects::EdgeKind;
     use crate::scan::front::{Chain, FrozenPlace, OpenPlace};
@@ -88,7 +88,7 @@ mod tests {
     use nalgebra::Matrix3;
 
     /// Places a metre apart along x.
-    fn straight(n: Vertex) -> Graph {
+    pub(crate) fn straight(n: Vertex) -> Graph {
         let mut graph = Graph::default();
         for v in 0..n {
             let previous_from_this = Pose2::new(1.0, 0.0, 0.0);
