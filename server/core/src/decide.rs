@@ -85,7 +85,7 @@ pub fn choose(
         if sibling {
             r.kept_until = r.belief.len() as Vertex - 1 + SIBLING_KEPT;
         }
-        if decides {
+        if decides && !r.holds(revisit) {
             r.refused.push(revisit);
         }
     }
@@ -144,6 +144,7 @@ pub(crate) mod tests {
     use crate::scan::matching::Mode;
     use crate::weigh::judge_alone;
     use nalgebra::{Matrix3, Vector3};
+    use std::sync::Arc;
 
     /// A chain of n places 1 m apart, straight on, that has drifted by `sigma_m` per place.
     pub(crate) fn chain(n: u32, sigma_m: f64) -> (Structure, Particle) {
@@ -243,6 +244,10 @@ pub(crate) mod tests {
         let (taken, refused) = (choice.taken.unwrap(), choice.refused.unwrap());
         assert_eq!((&taken.taken[..], &taken.refused[..]), (&[0][..], &[][..]));
         assert_eq!((&refused.taken[..], &refused.refused[..]), (&[][..], &[0][..]));
+        // Who holds it doubts a fit, but not the revisit.
+        let holds = Particle { taken: Arc::new(vec![0]), ..Particle::empty(10) };
+        let choice = choose(holds, &fit(20.0, 0.9, 3), 0, Some(unsure), 0.0, 20, (1, 0));
+        assert!(choice.refused.unwrap().refused.is_empty());
         // Who is as good as certain that it is false may still learn better.
         let sure = Judgement { posterior: 0.001, ..unsure };
         assert!(decided(&fit(20.0, 0.9, 3), sure, 0.0).refused.unwrap().refused.is_empty());

@@ -77,6 +77,11 @@ impl Particle {
         }
     }
 
+    /// Whether G has an edge of a revisit.
+    pub fn holds(&self, revisit: RevisitId) -> bool {
+        self.taken.binary_search(&revisit).is_ok()
+    }
+
     /// Adds an edge to G, and what it says of labels to L; X follows at the next update.
     pub fn take(&mut self, edge: Edge) {
         self.belief.hold(edge.factor);

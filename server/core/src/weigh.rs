@@ -52,10 +52,10 @@ pub fn judge(
     gamma_per_m2: f64,
 ) -> Option<Judgement> {
     let judgement = judge_alone(structure, particle, fit, t, testimony.log_looks, gamma_per_m2)?;
-    let (log_evidence, posterior) = if particle.refused.contains(&testimony.revisit) {
-        (0.0, 0.0)
-    } else if judgement.known && particle.taken.binary_search(&testimony.revisit).is_ok() {
+    let (log_evidence, posterior) = if particle.holds(testimony.revisit) && judgement.known {
         (testimony.gained, judgement.posterior)
+    } else if particle.refused.contains(&testimony.revisit) {
+        (0.0, 0.0)
     } else {
         (judgement.log_evidence, judgement.posterior)
     };
