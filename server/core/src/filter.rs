@@ -161,11 +161,12 @@ impl Filter {
         for fit in &measured.fits {
             let testimony = self.revisits.see(&self.graph, fit, t, log_looks(fit, fits));
             let judged = self.judge(t, fit, &testimony); // (17–18)
-            let to_all = judged.iter().all(|j| j.is_some_and(|j| j.known));
-            known += usize::from(to_all && fit.kind != EdgeKind::Semantic);
-            effects.push(match known {
-                0..=KNOWN_MAX => self.take_or_refuse(t, fit, &testimony, &judged),
-                _ => surplus(t, fit),
+            let news = fit.kind == EdgeKind::Semantic || !judged.iter().all(|j| j.is_some_and(|j| j.known));
+            known += usize::from(!news);
+            effects.push(if news || known <= KNOWN_MAX {
+                self.take_or_refuse(t, fit, &testimony, &judged)
+            } else {
+                surplus(t, fit)
             });
         }
         for p in &mut self.particles {
@@ -286,13 +287,15 @@ mod tests {
             let open = OpenPlace { id, stamp_ns: 0, front_from_place, path_m, chain };
             filter.step(FrozenPlace { open, content: Content::new(&[]) });
         }
-        let fits: Vec<Fit> = (16..20).map(|i| fit(i, f64::from(20 - i), EdgeKind::Distance)).collect();
+        let mut fits: Vec<Fit> = (16..20).map(|i| fit(i, f64::from(20 - i), EdgeKind::Distance)).collect();
+        fits.push(fit(15, 5.0, EdgeKind::Semantic));
+        fits.push(fit(0, 20.0, EdgeKind::Distance));
         let effects = filter.weigh_measured(20, Measured { fits, refused: vec![] });
-        let taken = effects.iter().filter(|e| matches!(e, Effect::EdgeAccepted { .. })).count();
-        assert_eq!((effects.len(), taken, filter.best().edges.len()), (4, 2, 2));
-        let said = vec![fit(15, 5.0, EdgeKind::Semantic)];
-        filter.weigh_measured(20, Measured { fits: said, refused: vec![] });
-        assert_eq!(filter.best().edges.len(), 3, "words are said once");
+        let taken = |e: &&Effect| matches!(e, Effect::EdgeAccepted { .. });
+        assert_eq!((effects.len(), effects.iter().filter(taken).count()), (6, 4));
+        let older = |p: &Particle| -> Vec<Vertex> { p.edges.iter().map(|e| e.i).collect() };
+        assert_eq!(older(filter.best()), [16, 17, 15], "words are said once");
+        assert!(filter.particles.iter().any(|p| older(p) == [16, 17, 15, 0]), "news is news");
     }
 
     fn fit(i: Vertex, x_m: f64, kind: EdgeKind) -> Fit {
