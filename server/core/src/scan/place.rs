@@ -69,44 +69,24 @@ pub fn spread(cloud: &[Point], n: usize) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::event::{Laser, Scan};
-    use crate::scan::sweep::sweep;
-    use std::f64::consts::TAU;
-
-    /// What is seen of a round room of 4 m in its middle; a leg stands at 1 m, `leg_deg` round, if at all.
-    fn seen(leg_deg: Option<usize>) -> Sweep {
-        let hidden = |k: usize| leg_deg.is_some_and(|leg| k.abs_diff(leg) < 8);
-        let range = |k: usize| if hidden(k) { 1.0 } else { 4.0 };
-        let scan = Scan {
-            robot: "r".into(),
-            laser: "l".into(),
-            stamp_ns: 0,
-            angle_min_rad: -TAU / 2.0,
-            angle_increment_rad: TAU / 360.0,
-            time_increment_s: 0.0,
-            ranges_m: (0..360).map(range).collect(),
-        };
-        let laser = Laser {
-            id: "l".into(),
-            body_from_laser: Pose2::default(),
-            upside_down: false,
-            range_min_m: 0.05,
-            range_max_m: 80.0,
-            ignored_rad: vec![],
-        };
-        sweep(&scan, &laser, |_| Pose2::default())
-    }
+    use crate::scan::rooms::{ROOM, seen};
 
     #[test]
     fn legs_that_walked_through_are_no_part_of_a_place() {
-        let nearest_m = |legs: &[Option<usize>]| {
-            let sweeps: Vec<Sweep> = legs.iter().map(|leg| seen(*leg)).collect();
+        // How near a surface there is when a leg, 20 cm wide, stands a metre off in such directions in turn.
+        let nearest_m = |bearings_rad: &[f64]| {
+            let leg = |bearing: f64| {
+                let (s, c) = bearing.sin_cos();
+                [c + 0.1 * s, s - 0.1 * c, c - 0.1 * s, s + 0.1 * c]
+            };
+            let walls = |bearing| [&ROOM[..], &[leg(bearing)]].concat();
+            let sweeps: Vec<Sweep> =
+                bearings_rad.iter().map(|b| seen(&walls(*b), &Pose2::default())).collect();
             let placed: Vec<(Pose2, &Sweep)> = sweeps.iter().map(|s| (Pose2::default(), s)).collect();
             Content::new(&placed).cloud.iter().map(|p| p.x.hypot(p.y)).fold(f32::MAX, f32::min)
         };
-        let walking: Vec<Option<usize>> = (0..5).map(|k| Some(100 + 30 * k)).collect();
-        assert!(nearest_m(&walking) > 3.9, "{}", nearest_m(&walking));
-        assert!(nearest_m(&[Some(180); 5]) < 1.1, "what stands stays");
-        assert!(nearest_m(&[None]) > 3.9);
+        assert!(nearest_m(&[-1.0, -0.4, 0.2, 0.8, 1.4]) > 2.9, "{}", nearest_m(&[-1.0, -0.4, 0.2, 0.8, 1.4]));
+        assert!(nearest_m(&[0.2; 5]) < 1.1, "what stands stays");
+        assert!(nearest_m(&[0.2]) < 1.1, "nobody knows");
     }
 }

@@ -24,7 +24,7 @@ pub const HALL: [[f64; 4]; 4] =
     [[-9.0, -7.0, 9.0, -7.0], [9.0, -7.0, 7.0, 8.0], [7.0, 8.0, -9.0, 6.0], [-9.0, 6.0, -9.0, -7.0]];
 
 /// What a laser of 360° sees of walls, (x0, y0, x1, y1), from a pose.
-fn seen(walls: &[[f64; 4]], world_from_laser: &Pose2) -> Sweep {
+pub fn seen(walls: &[[f64; 4]], world_from_laser: &Pose2) -> Sweep {
     let ranges_m = (0..720)
         .map(|k| {
             let (s, c) = (world_from_laser.yaw_rad - PI + f64::from(k) * TAU / 720.0).sin_cos();
