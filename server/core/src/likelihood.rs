@@ -113,8 +113,7 @@ pub fn compare(graph: &Graph, t: Vertex, predicted: &[Relative]) -> Option<Overl
 
 /// How closely a prediction can be compared, if at all.
 fn look(r: &Relative) -> Option<Look> {
-    let sigma_m = r.covariance[(0, 0)].max(r.covariance[(1, 1)]).sqrt();
-    let sigma_rad = r.covariance[(2, 2)].sqrt();
+    let (sigma_m, sigma_rad) = (r.sigma_m(), r.sigma_rad());
     (sigma_m < SIGMA_MAX_M && sigma_rad < SIGMA_MAX_RAD).then_some(Look {
         points_max: POINTS,
         views_max: VIEWS,

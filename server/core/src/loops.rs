@@ -229,7 +229,8 @@ fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
 }
 
 /// Matches the pairs that the memo does not know, some at a time, the likeliest first, until one looks alike:
-/// the others mostly show the same revisit. Words are said once: their pairs are matched first, and all.
+/// the others mostly show the same revisit. Words are said once: their pairs come first, and no fit ends
+/// them.
 fn match_new(graph: &mut Graph, t: Vertex, proposals: &[Proposal]) {
     let mut new: Vec<&Proposal> = proposals.iter().filter(|p| !graph.memo.contains_key(&(p.i, t))).collect();
     if new.is_empty() {
@@ -296,8 +297,13 @@ fn agreeing(graph: &Graph, i: Vertex, j: Vertex, guess: &Pose2) -> Option<Mode> 
         return None;
     }
     let mode = refine(older, &index(older), newer, guess)?;
-    let off = guess.between(&mode.i_from_j);
-    (good(&mode) && off.x_m.hypot(off.y_m) < AGREE_M && off.yaw_rad.abs() < AGREE_RAD).then_some(mode)
+    (good(&mode) && agree(guess, &mode.i_from_j, 1.0)).then_some(mode)
+}
+
+/// Whether two transforms are one within `times` what registration may err by.
+pub fn agree(a: &Pose2, b: &Pose2, times: f64) -> bool {
+    let off = a.between(b);
+    off.x_m.hypot(off.y_m) < times * AGREE_M && off.yaw_rad.abs() < times * AGREE_RAD
 }
 
 /// Asks the places before `t`, and if it was left long ago those after it, whether they agree with a fit
@@ -337,9 +343,8 @@ fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
     for f in fits {
         let same = |k: &&mut Fit| {
             !graph.apart(k.i, f.i, 2.0 * FOLLOW_REACH_M) && {
-                let off = graph.chained(k.i, f.i).compose(&f.mode.i_from_j);
-                let off = k.mode.i_from_j.between(&off);
-                off.x_m.hypot(off.y_m) < 2.0 * AGREE_M && off.yaw_rad.abs() < 2.0 * AGREE_RAD
+                let seen_from_k = graph.chained(k.i, f.i).compose(&f.mode.i_from_j);
+                agree(&k.mode.i_from_j, &seen_from_k, 2.0)
             }
         };
         match kept.values_mut().find(same) {

@@ -75,9 +75,10 @@ pub fn is_lost(graph: &Graph, structure: &Structure, belief: &Belief, t: Vertex)
     let segment = |v: Vertex| graph.place(v).segment;
     let ends: Vec<Vertex> =
         (0..t).filter(|&i| segment(i) != segment(t) && segment(i) != segment(i + 1)).collect();
-    let sigma_m = |r: &Relative| r.covariance[(0, 0)].max(r.covariance[(1, 1)]).sqrt();
     !ends.is_empty()
-        && belief.relative(structure, t, &ends).is_ok_and(|all| all.iter().all(|r| sigma_m(r) > LOST_SIGMA_M))
+        && belief
+            .relative(structure, t, &ends)
+            .is_ok_and(|all| all.iter().all(|r| r.sigma_m() > LOST_SIGMA_M))
 }
 
 /// What equal particles would look at from place `t`: distance edges, semantic edges, and any place

@@ -7,7 +7,7 @@
 
 use crate::geometry::Pose2;
 use crate::graph::{Graph, Vertex};
-use crate::loops::{AGREE_M, AGREE_RAD, FOLLOW_REACH_M, Fit};
+use crate::loops::{FOLLOW_REACH_M, Fit, agree};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -73,8 +73,7 @@ impl Revisit {
         }
         let expected =
             graph.chained(fit.i, self.i).compose(&self.i_from_j).compose(&graph.chained(self.j, t));
-        let off = expected.between(&fit.mode.i_from_j);
-        off.x_m.hypot(off.y_m) < 2.0 * AGREE_M && off.yaw_rad.abs() < 2.0 * AGREE_RAD
+        agree(&expected, &fit.mode.i_from_j, 2.0)
     }
 }
 

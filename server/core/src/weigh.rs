@@ -15,7 +15,7 @@
 
 use crate::effects::EdgeKind;
 use crate::graph::Vertex;
-use crate::loops::{AGREE_M, AGREE_RAD, Fit};
+use crate::loops::{AGREE_M, AGREE_RAD, Fit, agree};
 use crate::particle::Particle;
 use crate::propose::{LOST_SIGMA_M, RELOCALISATION_P, distance_probability};
 use crate::revisit::Testimony;
@@ -106,13 +106,9 @@ pub fn log_density_ratio(predicted: &Relative, fit: &Fit) -> Option<(f64, f64)> 
 
 /// Whether the prediction is as good as a fit, and they agree.
 fn is_known(predicted: &Relative, fit: &Fit) -> bool {
-    let off = predicted.i_from_a.between(&fit.mode.i_from_j);
-    let variance = predicted.covariance.diagonal();
-    let sigma_m = variance.x.max(variance.y).sqrt();
-    off.x_m.hypot(off.y_m) < AGREE_M
-        && off.yaw_rad.abs() < AGREE_RAD
-        && sigma_m < AGREE_M
-        && variance.z.sqrt() < AGREE_RAD
+    agree(&predicted.i_from_a, &fit.mode.i_from_j, 1.0)
+        && predicted.sigma_m() < AGREE_M
+        && predicted.sigma_rad() < AGREE_RAD
 }
 
 /// p(e = 1) before the scans: eq. (7) of this particle, or the names', whichever says more.
@@ -122,8 +118,7 @@ fn edge_prior(particle: &Particle, fit: &Fit, t: Vertex, predicted: &Relative, g
         EdgeKind::Semantic => particle.labels.similarity(fit.i, t).max(0.1),
         _ => 0.0,
     };
-    let sigma_m = predicted.covariance[(0, 0)].max(predicted.covariance[(1, 1)]).sqrt();
-    let lost = if sigma_m > LOST_SIGMA_M { RELOCALISATION_P } else { 0.0 };
+    let lost = if predicted.sigma_m() > LOST_SIGMA_M { RELOCALISATION_P } else { 0.0 };
     by_distance.max(by_name).max(lost).clamp(1e-3, 0.9)
 }
 

@@ -325,7 +325,7 @@ mod tests {
         assert!(off.x_m.hypot(off.y_m) < 1e-3 && off.yaw_rad.abs() < 1e-3, "{off:?}");
     }
 
-    /// How much of the information along x of a cloud laid on itself, .4 m off, is sound.
+    /// How much of the information along x is sound of a cloud laid on itself, from a guess so far off.
     fn sound_share(cloud: &[Point], guess_m: f64) -> f64 {
         let (source, index) = (near(cloud), Index::new(cloud, 0.6));
         let found = align(&source, &index, &Pose2::new(guess_m, 0.0, 0.0), None, 0.25).unwrap();

@@ -62,6 +62,18 @@ pub struct Relative {
     pub covariance: Matrix3<f64>,
 }
 
+impl Relative {
+    /// Standard deviation of the translation along the less certain axis of a, metres.
+    pub fn sigma_m(&self) -> f64 {
+        self.covariance[(0, 0)].max(self.covariance[(1, 1)]).sqrt()
+    }
+
+    /// Standard deviation of the heading.
+    pub fn sigma_rad(&self) -> f64 {
+        self.covariance[(2, 2)].sqrt()
+    }
+}
+
 /// Y of one pose: by clique from the pose's own to the root, the frontals' rows.
 type Column = Vec<(u32, MatrixXx3<f64>)>;
 /// One clique's.
