@@ -3,9 +3,10 @@
 //! range means.
 
 use nalgebra::Matrix3;
-use toponym_core::effects::{self, EdgeKind, TrackState};
+use toponym_core::answers::query::{self, GraphAnswer, WhereAnswer};
+use toponym_core::edge::EdgeKind;
+use toponym_core::effects::{self, TrackState};
 use toponym_core::event::{self, Event};
-use toponym_core::query::{self, GraphAnswer, WhereAnswer};
 use toponym_core::{Pose2, geometry};
 use toponym_proto::answer::{
     ANSWER_VERSION, Candidate, Edge, FromRobot, Goal, GraphReply, GridReply, Grounded, Heard, HeardStatus,

@@ -12,9 +12,9 @@ use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::hint::black_box;
 use toponym_core::event::{Laser, Odom, Scan, Setup};
 use toponym_core::scan::correlate::Source;
-use toponym_core::scan::front::{FrontEnd, FrozenPlace};
 use toponym_core::scan::matching::{index, modes, refine};
 use toponym_core::scan::sweep::{Sweep, sweep};
+use toponym_core::track::front::{FrontEnd, FrozenPlace};
 use toponym_core::{Config, Event, Mapper, Pose2};
 
 /// The corridor's centre line is a rectangle of this size …

@@ -1,28 +1,14 @@
 //! What an event brought about: the one source of reports, feedback and debugging.
 
+use crate::edge::Proposal;
+use crate::edge::{EdgeKind, PlaceId};
 use crate::event::StampNs;
 use crate::geometry::Pose2;
-use crate::propose::Proposal;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
-/// A place: a vertex of the graph. Never reused.
-pub type PlaceId = u64;
-
 /// What one [`crate::Mapper::step`] brought about, in order.
 pub type Effects = Vec<Effect>;
-
-/// How an edge between two places came about.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum EdgeKind {
-    /// Proposed because the two are near, eqs. (6–7).
-    Distance,
-    /// Proposed because the two are called alike, eqs. (8–9).
-    Semantic,
-    /// Proposed because the robot had lost its place.
-    Relocalisation,
-}
 
 /// How well the robot knows where it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,19 +1,16 @@
 //! What all particles share: places with their scans, the chain between them, and the memo of
 //! what was matched. Append-only.
 
-use crate::effects::PlaceId;
+use crate::edge::{PlaceId, Vertex};
 use crate::event::StampNs;
 use crate::geometry::Pose2;
-use crate::scan::front::{Chain, FrozenPlace};
 use crate::scan::matching::Mode;
 use crate::scan::place::Content;
+use crate::track::front::{Chain, FrozenPlace};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
-
-/// Index of a place in the graph: the vertex v of the paper. Equal to its id.
-pub type Vertex = u32;
 
 /// A place: where the robot was each metre of its path.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -5,9 +5,9 @@
 //! edge and the map.
 
 use crate::config::Config;
+use crate::edge::Vertex;
+use crate::filter::loops::Fit;
 use crate::geometry::Pose2;
-use crate::graph::Vertex;
-use crate::loops::Fit;
 use crate::random::{Purpose, generator};
 use crate::scan::correlate::WINDOW_M;
 use rand::RngExt;
@@ -31,7 +31,7 @@ pub fn inject(config: &Config, t: Vertex, fits: &mut [Fit]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::EdgeKind;
+    use crate::edge::EdgeKind;
     use crate::scan::matching::Mode;
     use nalgebra::Matrix3;
 

@@ -12,46 +12,28 @@
 //! a pose is ordered x, y, yaw; covariances of poses are those of the right perturbation
 //! `X·exp(δ)`, i.e. they live in the body's frame.
 
-pub mod chance;
+pub mod answers;
 pub mod config;
-pub mod decide;
-mod describe;
+pub mod edge;
 pub mod effects;
 pub mod event;
 pub mod filter;
 pub mod geometry;
 pub mod graph;
-pub mod grid;
 pub mod inject;
-pub mod labels;
 pub mod language;
-pub mod ledger;
-pub mod likelihood;
-pub mod listen;
-pub mod loops;
 pub mod mapper;
-mod mend;
-pub mod odometry;
-pub mod particle;
-pub mod predictive;
-pub mod propose;
-pub mod query;
 pub mod random;
-pub mod resample;
-pub mod revisit;
 pub mod scan;
-mod second_look;
 pub mod smoothing;
-pub mod snapshot;
-mod take_in;
-pub mod trajectory;
-pub mod weigh;
+pub mod talk;
+pub mod track;
 mod wide;
 
+pub use answers::query::{Answer, Query};
+pub use answers::snapshot::Snapshot;
 pub use config::Config;
 pub use effects::{Effect, Effects};
 pub use event::Event;
 pub use geometry::Pose2;
 pub use mapper::Mapper;
-pub use query::{Answer, Query};
-pub use snapshot::Snapshot;

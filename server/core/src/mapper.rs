@@ -1,18 +1,19 @@
 //! The core's public face: events in, effects out.
 
+use crate::answers::snapshot::Snapshot;
+use crate::edge::Vertex;
 use crate::effects::{Effect, Effects, TrackState};
 use crate::event::{Laser, Odom, Scan, Setup, StampNs, Utterance};
 use crate::filter::Filter;
+use crate::filter::particle::{Edge, Particle};
+use crate::filter::propose::is_lost;
 use crate::geometry::Pose2;
-use crate::graph::{Graph, Place, Vertex};
-use crate::listen::Here;
-use crate::odometry::{Odometry, Step};
-use crate::particle::{Edge, Particle};
-use crate::propose::is_lost;
-use crate::scan::front::{FrontEnd, FrozenPlace, OpenPlace};
+use crate::graph::{Graph, Place};
 use crate::scan::sweep::sweep;
 use crate::smoothing::SmoothError;
-use crate::snapshot::Snapshot;
+use crate::talk::listen::Here;
+use crate::track::front::{FrontEnd, FrozenPlace, OpenPlace};
+use crate::track::odometry::{Odometry, Step};
 use crate::{Answer, Config, Event, Query};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -351,7 +352,7 @@ fn continues(before: &[Edge], after: &[Edge]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::EdgeKind;
+    use crate::edge::EdgeKind;
 
     #[test]
     fn whatever_makes_another_particle_the_best_tells_that_coordinates_jump() {

@@ -9,16 +9,17 @@ use crate::logistic::{Example, fit};
 use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
 use toponym_core::Pose2;
-use toponym_core::chance::{LOOKS, log_looks, looks};
 use toponym_core::config::Config;
-use toponym_core::effects::EdgeKind;
-use toponym_core::graph::Vertex;
-use toponym_core::loops::{Fit, Loops};
-use toponym_core::propose::{LOST_SIGMA_M, NEAR_M, Proposal, distance_probability, draw};
+use toponym_core::edge::EdgeKind;
+use toponym_core::edge::Proposal;
+use toponym_core::edge::Vertex;
+use toponym_core::filter::chance::{LOOKS, log_looks, looks};
+use toponym_core::filter::loops::{Fit, Loops};
+use toponym_core::filter::propose::{LOST_SIGMA_M, NEAR_M, distance_probability, draw};
+use toponym_core::filter::weigh::{DENSITY_POWER, log_density_ratio, weigh};
 use toponym_core::random::{Purpose, uniform};
-use toponym_core::scan::front::LOCAL_PATH_M;
 use toponym_core::smoothing::Relative;
-use toponym_core::weigh::{DENSITY_POWER, log_density_ratio, weigh};
+use toponym_core::track::front::LOCAL_PATH_M;
 
 const DRIFTS_M: [f64; 4] = [0.3, 1.0, 3.0, 8.0];
 /// Drift of the heading by that of the position, at most the last: 10 m of path turn as much as they shift.

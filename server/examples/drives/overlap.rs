@@ -8,14 +8,14 @@ use crate::drive::Drive;
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
 use toponym_core::Pose2;
-use toponym_core::graph::Vertex;
-use toponym_core::likelihood::{Overlap, compare, nearest};
-use toponym_core::loops::SCORE_MIN;
+use toponym_core::edge::Vertex;
+use toponym_core::filter::likelihood::{Overlap, compare, nearest};
+use toponym_core::filter::loops::SCORE_MIN;
 use toponym_core::random::{Purpose, uniform};
 use toponym_core::scan::correlate::Source;
-use toponym_core::scan::front::LOCAL_PATH_M;
 use toponym_core::scan::matching::modes;
 use toponym_core::smoothing::Relative;
+use toponym_core::track::front::LOCAL_PATH_M;
 
 /// Standard deviations of a relative pose: metres, metres, radians.
 const KNOWN: [f64; 3] = [0.05, 0.05, 0.0025];

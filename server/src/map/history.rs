@@ -6,8 +6,8 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use toponym_core::Effect;
-use toponym_core::effects::{EdgeKind, PlaceId};
-use toponym_core::propose::Proposal;
+use toponym_core::edge::Proposal;
+use toponym_core::edge::{EdgeKind, PlaceId};
 use toponym_proto::stream::Stamp;
 
 /// Writes the history file.

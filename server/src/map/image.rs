@@ -6,8 +6,8 @@ use embedded_graphics::prelude::*;
 use embedded_graphics::primitives::Rectangle;
 use std::collections::BTreeMap;
 use toponym_core::Pose2;
-use toponym_core::effects::{EdgeKind, PlaceId};
-use toponym_core::query::{EdgeView, GraphAnswer, Grid, PlaceView};
+use toponym_core::answers::query::{EdgeView, GraphAnswer, Grid, PlaceView};
+use toponym_core::edge::{EdgeKind, PlaceId};
 
 /// Longest side of the map's part of the picture, pixels.
 const SIDE_MAX: usize = 1800;
@@ -258,7 +258,7 @@ fn scale_bar_m(pixels_per_m: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toponym_core::query::ParticleView;
+    use toponym_core::answers::query::ParticleView;
 
     fn place(id: PlaceId, x: f64, y: f64, labels: &[(&str, f64)]) -> PlaceView {
         let labels = labels.iter().map(|(n, p)| ((*n).to_string(), *p)).collect();

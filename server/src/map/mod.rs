@@ -25,7 +25,7 @@ use std::path::Path;
 use std::time::Instant;
 use timing::{Stage, Timing};
 use toponym::log::{self, Narration, Notes, Records};
-use toponym_core::query::{GraphAnswer, WhereAnswer};
+use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
 use toponym_core::{Answer, Mapper, Pose2, Query};
 
 /// Runs `map`.

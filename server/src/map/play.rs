@@ -6,9 +6,9 @@ use crate::convert;
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Instant;
 use toponym::log::LogRecord;
+use toponym_core::answers::query::GraphAnswer;
+use toponym_core::answers::trajectory::{Keyframe, carry};
 use toponym_core::effects::Heard;
-use toponym_core::query::GraphAnswer;
-use toponym_core::trajectory::{Keyframe, carry};
 use toponym_core::{Effect, Effects, Event, Mapper, Pose2};
 use toponym_proto::{Message, Refused};
 

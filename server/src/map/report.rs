@@ -8,8 +8,9 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use toponym::log::Notes;
 use toponym_core::Config;
-use toponym_core::effects::{EdgeKind, Heard, HeardStatus, PlaceId};
-use toponym_core::query::{GraphAnswer, WhereAnswer};
+use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
+use toponym_core::edge::{EdgeKind, PlaceId};
+use toponym_core::effects::{Heard, HeardStatus};
 use toponym_proto::answer::{Candidate, MapIdentity};
 use toponym_proto::stream::Stamp;
 
@@ -187,7 +188,7 @@ pub fn build() -> String {
     option_env!("TOPONYM_COMMIT").map_or_else(|| version.into(), |commit| format!("{version}+{commit}"))
 }
 
-fn place(p: &toponym_core::query::PlaceView) -> Place {
+fn place(p: &toponym_core::answers::query::PlaceView) -> Place {
     Place {
         id: p.id,
         stamp_s: seconds(p.stamp_ns),
@@ -198,7 +199,7 @@ fn place(p: &toponym_core::query::PlaceView) -> Place {
     }
 }
 
-fn particle(p: &toponym_core::query::ParticleView) -> Particle {
+fn particle(p: &toponym_core::answers::query::ParticleView) -> Particle {
     let edges = p.edges.iter().map(|e| Edge {
         i: e.i,
         j: e.j,

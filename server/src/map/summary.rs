@@ -3,8 +3,9 @@
 use super::{Finished, MapArgs, trajectory};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
-use toponym_core::effects::{EdgeKind, HeardStatus};
-use toponym_core::query::WhereAnswer;
+use toponym_core::answers::query::WhereAnswer;
+use toponym_core::edge::EdgeKind;
+use toponym_core::effects::HeardStatus;
 
 /// A handful of lines.
 pub fn text(args: &MapArgs, done: &Finished) -> String {

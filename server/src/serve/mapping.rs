@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
-use toponym_core::effects::EdgeKind;
+use toponym_core::edge::EdgeKind;
 use toponym_core::{Effect, Mapper};
 use toponym_proto::answer::{ANSWER_VERSION, Jump, MapIdentity, PoseOut};
 use toponym_proto::record::{RecordError, RecordWriter};

@@ -21,7 +21,8 @@ use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::path::PathBuf;
-use toponym_core::language::{FEATURES, Relation, path_features};
+use toponym_core::language::path_features;
+use toponym_core::language::{FEATURES, Relation};
 
 /// Settings are split into so many parts.
 const FOLDS: usize = 5;

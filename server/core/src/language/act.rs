@@ -1,8 +1,8 @@
 //! What a text says, typed: analyses of acts, acts of phrases. `notation.rs` has the written form.
 
-pub use super::measure::{Distance, Unit};
-use super::names::{Kind, Name};
-use super::relation::Relation;
+use crate::language::lexicon::names::{Kind, Name};
+pub use crate::language::measure::{Distance, Unit};
+use crate::language::relation::Relation;
 use serde::{Deserialize, Serialize};
 
 /// What a text says: all readings that are kept, likeliest first.

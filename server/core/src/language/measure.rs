@@ -1,7 +1,7 @@
 //! Lengths and counts: "about twenty meters", "a couple of".
 
-use super::cursor::Cursor;
-use super::numbers::quantity;
+use crate::language::grammar::cursor::Cursor;
+use crate::language::lexicon::numbers::quantity;
 use serde::{Deserialize, Serialize};
 
 /// A length as said.

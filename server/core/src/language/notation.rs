@@ -31,7 +31,7 @@
 //!
 //! `x` is what is asked for, `*` any place, `path` the way one is going, `agent` who is spoken to.
 
-use super::act::{
+use crate::language::act::{
     About, Act, Content, Features, Frame, Head, Locate, Modifiers, Ordinal, Owner, Phrase, Quantity,
     Question, Reason, Restriction, Sameness, Unit,
 };

@@ -1,7 +1,7 @@
 //! What "it" and "there" speak of: what was named last, and a place near by that the speaker points to.
 
-use super::act::{Content, Head, Locate, Modifiers, Parse, Phrase};
-use super::relation::Relation;
+use crate::language::act::{Content, Head, Locate, Modifiers, Parse, Phrase};
+use crate::language::relation::Relation;
 
 /// Puts in the place of each "it" what the acts before spoke of, or `before` them the last sentence.
 /// Without either, "it" stays.
@@ -89,7 +89,8 @@ pub fn seen_from_here(l: &Locate) -> Option<Locate> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::{parse, words};
+    use crate::language::grammar::parse::parse;
+    use crate::language::words;
 
     fn resolved(text: &str, before: Option<&str>) -> String {
         let mut parsed = parse(text);

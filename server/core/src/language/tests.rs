@@ -1,8 +1,8 @@
 //! What sentences say, as a whole. `golden.jsonl` is a table of our own sentences; the example `parse`
 //! scores such tables.
 
-use super::act::{Content, Head, Locate};
 use super::*;
+use crate::language::act::{Content, Head, Locate};
 use proptest::prelude::*;
 
 fn read(text: &str) -> String {

@@ -1,11 +1,11 @@
 //! Acts in words, for the guide: what was understood.
 
-use super::act::{
+use crate::language::act::{
     About, Act, Content, Head, Locate, Ordinal, Owner, Phrase, Quantity, Question, Reason, Restriction,
     Sameness, Unit,
 };
-use super::names::Name;
-use super::relation::Relation;
+use crate::language::lexicon::names::Name;
+use crate::language::relation::Relation;
 
 /// What the guide is told when nothing was understood.
 pub const NOT_UNDERSTOOD: &str = "I did not understand; nothing was changed. Try: this is the kitchen.";
@@ -247,8 +247,8 @@ fn with_indefinite(name: &Name) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::super::parse;
     use super::*;
+    use crate::language::grammar::parse::parse;
 
     #[test]
     fn the_guide_is_told_what_was_understood() {

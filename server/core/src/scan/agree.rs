@@ -4,9 +4,9 @@
 //! that the other's laser saw through, cannot be there. It is what tells look-alikes with
 //! different surroundings apart.
 
-use super::cloud::Point;
-use super::place::{Content, View};
 use crate::geometry::Pose2;
+use crate::scan::cloud::Point;
+use crate::scan::place::{Content, View};
 
 /// Agreeing points that a conflicting one outweighs; from the same pairs as the thresholds of
 /// `scan/matching.rs`.

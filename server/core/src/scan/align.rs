@@ -13,9 +13,9 @@
 //! legs of a guide who walks ahead: along u what was not seen to stand says as good as nothing, and a
 //! prior may be given more weight than elsewhere.
 
-use super::cloud::{Nearest, Point, Surfaces};
-use super::weak::Weak;
 use crate::geometry::Pose2;
+use crate::scan::cloud::{Nearest, Point, Surfaces};
+use crate::scan::weak::Weak;
 use nalgebra::{Matrix3, Vector3};
 
 /// Standard deviation of a range along the normal, walls' roughness included.
@@ -203,8 +203,8 @@ fn linearise(
 
 #[cfg(test)]
 mod tests {
-    use super::super::cloud::Index;
     use super::*;
+    use crate::scan::cloud::Index;
 
     fn wall(x0: f32, y0: f32, x1: f32, y1: f32) -> impl Iterator<Item = Point> {
         let length = (x1 - x0).hypot(y1 - y0);

@@ -65,7 +65,7 @@ pub trait Surfaces {
 }
 
 /// Largest whole number not above: `f32::floor` is a library call on the oldest CPUs that we run on.
-pub(super) fn floor(v: f32) -> i32 {
+pub(crate) fn floor(v: f32) -> i32 {
     let whole = v as i32;
     whole.saturating_sub(i32::from(v < whole as f32))
 }

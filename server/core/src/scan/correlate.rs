@@ -9,9 +9,9 @@
 //! that faces the same way. Wrong transforms then hit little, their bounds are low, and the search
 //! stays short.
 
-use super::cloud::Point;
-use super::place::spread;
 use crate::geometry::{Pose2, wrap};
+use crate::scan::cloud::Point;
+use crate::scan::place::spread;
 use std::collections::BinaryHeap;
 use std::f32::consts::TAU;
 

@@ -1,11 +1,11 @@
 //! Two places' scans to modes: the measurement z behind every loop edge.
 
-use super::agree::{Look, agreement};
-use super::align::{align, sound_information};
-use super::cloud::{Index, Point};
-use super::correlate::{Raster, Source, search};
-use super::place::Content;
 use crate::geometry::Pose2;
+use crate::scan::agree::{Look, agreement};
+use crate::scan::align::{align, sound_information};
+use crate::scan::cloud::{Index, Point};
+use crate::scan::correlate::{Raster, Source, search};
+use crate::scan::place::Content;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 

@@ -16,12 +16,9 @@ pub mod agree;
 pub mod align;
 pub mod cloud;
 pub mod correlate;
-pub mod front;
-mod local;
 pub mod matching;
 pub mod place;
 #[cfg(test)]
 pub mod rooms;
 pub mod sweep;
 mod weak;
-mod wheels;

@@ -1,10 +1,10 @@
 //! A place's matchable content: the scans of the last and next few metres, frozen when the robot
 //! has left it.
 
-use super::agree::{Look, votes};
-use super::cloud::{Point, moved, thin};
-use super::sweep::{RangeImage, Sweep};
 use crate::geometry::Pose2;
+use crate::scan::agree::{Look, votes};
+use crate::scan::cloud::{Point, moved, thin};
+use crate::scan::sweep::{RangeImage, Sweep};
 use serde::{Deserialize, Serialize};
 
 /// Thinning of a place's cloud.

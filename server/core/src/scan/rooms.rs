@@ -1,9 +1,9 @@
 //! Rooms to test by: what places in them look like.
 
-use super::place::Content;
-use super::sweep::{Sweep, sweep};
 use crate::event::{Laser, Scan};
 use crate::geometry::Pose2;
+use crate::scan::place::Content;
+use crate::scan::sweep::{Sweep, sweep};
 use std::f64::consts::{PI, TAU};
 
 /// A room of 9 m × 6 m with a niche, a cupboard and a screen.

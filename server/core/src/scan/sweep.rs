@@ -1,8 +1,8 @@
 //! One sweep of a laser: validated, de-skewed, in the body frame at the reference time.
 
-use super::cloud::Point;
 use crate::event::{Laser, Scan};
 use crate::geometry::Pose2;
+use crate::scan::cloud::Point;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 

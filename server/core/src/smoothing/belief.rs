@@ -1,14 +1,14 @@
 //! One particle's Gaussian over its poses: linearisation points, steps from them, and the numbers
 //! of each clique.
 
-use super::chunked::Chunked;
-use super::factor::{At, residual};
-use super::front::Front;
-use super::marginal::Prior;
-use super::structure::Structure;
-use super::tree::{Clique, Entry, NONE, Places, Share};
-use super::{FactorId, SmoothError};
 use crate::geometry::Pose2;
+use crate::smoothing::chunked::Chunked;
+use crate::smoothing::factor::{At, residual};
+use crate::smoothing::front::Front;
+use crate::smoothing::marginal::Prior;
+use crate::smoothing::structure::Structure;
+use crate::smoothing::tree::{Clique, Entry, NONE, Places, Share};
+use crate::smoothing::{FactorId, SmoothError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

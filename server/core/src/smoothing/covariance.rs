@@ -11,12 +11,12 @@
 //! to millimetres from one another and to kilometres from the origin. The newest pose is a root, where
 //! its Y begins and ends.
 
-use super::factor::{sandwich, symmetrised};
-use super::inverse::Sigma;
-use super::structure::Structure;
-use super::tree::{Clique, NONE};
-use super::{Belief, SmoothError};
 use crate::geometry::Pose2;
+use crate::smoothing::factor::{sandwich, symmetrised};
+use crate::smoothing::inverse::Sigma;
+use crate::smoothing::structure::Structure;
+use crate::smoothing::tree::{Clique, NONE};
+use crate::smoothing::{Belief, SmoothError};
 use nalgebra::{Dyn, Matrix3, MatrixView, MatrixXx3, U1, U3};
 use std::hint::black_box;
 use std::rc::Rc;

@@ -1,7 +1,7 @@
 //! Between-factors: their error, its linearisation, and the checks an information matrix passes.
 
-use super::SmoothError;
 use crate::geometry::{Pose2, wrap};
+use crate::smoothing::SmoothError;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 

@@ -13,7 +13,7 @@
 // Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
 #![allow(clippy::inline_always)]
 
-use super::kernels::{
+use crate::smoothing::kernels::{
     Ill, back, block_of, columns_of, dots, eliminate_panel, offset, rows_of, solve_lower, subtract_products,
     wide,
 };

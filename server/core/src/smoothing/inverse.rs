@@ -8,10 +8,10 @@
 // Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
 #![allow(clippy::inline_always)]
 
-use super::factor::symmetrised;
-use super::front::Front;
-use super::kernels::{block_of, dots, rows_of, solve_lower, wide};
-use super::tree::Clique;
+use crate::smoothing::factor::symmetrised;
+use crate::smoothing::front::Front;
+use crate::smoothing::kernels::{block_of, dots, rows_of, solve_lower, wide};
+use crate::smoothing::tree::Clique;
 use nalgebra::Matrix3;
 
 /// Rows come in whole registers of so many numbers, as wide as those of most processors: no loop has a

@@ -6,11 +6,11 @@
 //! between-factor. r is one that v held well: from one hardly known relative to the others, or not at
 //! all where a particle lacks the factor, the others would seem to bend when they turn together.
 
-use super::factor::{At, residual};
-use super::front::Front;
-use super::structure::{Marginalised, Structure};
-use super::tree::{Entry, NONE};
-use super::{Belief, SmoothError};
+use crate::smoothing::factor::{At, residual};
+use crate::smoothing::front::Front;
+use crate::smoothing::structure::{Marginalised, Structure};
+use crate::smoothing::tree::{Entry, NONE};
+use crate::smoothing::{Belief, SmoothError};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 

@@ -5,11 +5,11 @@
 //! subtracted: R's first rows are the frontals' `Lᵀ`, and what is left is `R_Sᵀ R_S`. Where that
 //! square would lose digits, the parent takes up R_S, and is eliminated by QR as well.
 
-use super::factor::residual;
-use super::front::Front;
-use super::structure::Structure;
-use super::tree::{Clique, Entry, NONE, Places, Share};
-use super::{Belief, SmoothError};
+use crate::smoothing::factor::residual;
+use crate::smoothing::front::Front;
+use crate::smoothing::structure::Structure;
+use crate::smoothing::tree::{Clique, Entry, NONE, Places, Share};
+use crate::smoothing::{Belief, SmoothError};
 use faer::linalg::solvers::{Qr, SelfAdjointEigen};
 use faer::{Mat, MatRef, Side};
 

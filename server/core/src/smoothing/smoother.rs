@@ -1,7 +1,7 @@
 //! Smoothing of a single graph: a structure and the one belief about it.
 
-use super::{Belief, Factor, FactorId, Joint, JointRoom, Relative, SmoothError, Structure, Work};
 use crate::geometry::Pose2;
+use crate::smoothing::{Belief, Factor, FactorId, Joint, JointRoom, Relative, SmoothError, Structure, Work};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;

@@ -1,9 +1,9 @@
 //! What all particles share: poses, factors, and the tree's shape.
 
-use super::factor::{At, checked_information};
-use super::tree::{Entry, Tree};
-use super::{Factor, FactorId, SmoothError};
 use crate::geometry::Pose2;
+use crate::smoothing::factor::{At, checked_information};
+use crate::smoothing::tree::{Entry, Tree};
+use crate::smoothing::{Factor, FactorId, SmoothError};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 

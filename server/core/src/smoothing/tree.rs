@@ -5,9 +5,9 @@
 //! cliques from its poses up to the root; that top is cut off, ordered anew and re-attached to the
 //! subtrees below it (orphans), which stay as they are.
 
-use super::factor::At;
-use super::order::Order;
-use super::{Factor, FactorId};
+use crate::smoothing::factor::At;
+use crate::smoothing::order::Order;
+use crate::smoothing::{Factor, FactorId};
 use serde::{Deserialize, Serialize};
 
 /// No clique; in a [`Share`], the origin.

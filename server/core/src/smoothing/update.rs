@@ -1,12 +1,12 @@
 //! Incremental update of a belief (iSAM2): cliques that changed are eliminated anew, steps follow by
 //! back-substitution, and poses that left their linearisation points are linearised anew.
 
-use super::belief::{Belief, Step};
-use super::chunked::Chunked;
-use super::factor::At;
-use super::structure::{Stiffness, Structure};
-use super::tree::{Clique, NONE};
-use super::{SmoothError, qr};
+use crate::smoothing::belief::{Belief, Step};
+use crate::smoothing::chunked::Chunked;
+use crate::smoothing::factor::At;
+use crate::smoothing::structure::{Stiffness, Structure};
+use crate::smoothing::tree::{Clique, NONE};
+use crate::smoothing::{SmoothError, qr};
 use std::sync::Arc;
 
 /// How hard an update tries. Where no unit is given, in standard deviations of a pose's stiffest

@@ -3,11 +3,12 @@
 mod talk;
 mod world;
 
-use toponym_core::effects::{EdgeKind, Effect, Effects, HeardStatus, TrackState};
+use toponym_core::answers::query::{Answer, Query, WhereAnswer};
+use toponym_core::edge::EdgeKind;
+use toponym_core::effects::{Effect, Effects, HeardStatus, TrackState};
 use toponym_core::event::{Event, Odom, Scan};
 use toponym_core::geometry::Pose2;
 use toponym_core::mapper::SaveError;
-use toponym_core::query::{Answer, Query, WhereAnswer};
 use toponym_core::{Config, Mapper};
 use world::{drive, events, laser, say};
 

@@ -1,8 +1,8 @@
 //! Settled, the smoother is where a batch optimiser of others ends: Levenberg–Marquardt of factrs.
 
-use super::dense::{Graph, Term, chart};
-use super::script::{GOOD, Script};
 use crate::geometry::Pose2;
+use crate::smoothing::tests::dense::{Graph, Term, chart};
+use crate::smoothing::tests::script::{GOOD, Script};
 use factrs::assign_symbols;
 use factrs::containers::{Factor, FactorBuilder, Graph as Batch, Values};
 use factrs::linalg::{Const, ForwardProp, Matrix3, Numeric, VectorX};

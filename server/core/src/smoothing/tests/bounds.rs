@@ -1,7 +1,7 @@
 //! How far from the optimum updates leave the poses, and thinned chains from whole ones.
 
-use super::dense::chart;
-use super::script::{GOOD, Op, Script, op};
+use crate::smoothing::tests::dense::chart;
+use crate::smoothing::tests::script::{GOOD, Op, Script, op};
 use crate::smoothing::{JointRoom, Smoother};
 use nalgebra::Matrix3;
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! A chain as long as a robot's life.
 
-use super::script::{GOOD, information};
 use crate::geometry::Pose2;
+use crate::smoothing::tests::script::{GOOD, information};
 use crate::smoothing::{Factor, JointRoom, Smoother};
 
 #[test]

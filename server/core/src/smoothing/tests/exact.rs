@@ -1,10 +1,10 @@
 //! Settled, the smoother says what the reference says.
 
-use super::dense::{chart, derivative};
-use super::script::{Script, op};
 use crate::geometry::Pose2;
 use crate::smoothing::JointRoom;
 use crate::smoothing::factor::{At, residual};
+use crate::smoothing::tests::dense::{chart, derivative};
+use crate::smoothing::tests::script::{Script, op};
 use nalgebra::{DVector, Matrix3, Vector3};
 use proptest::prelude::*;
 

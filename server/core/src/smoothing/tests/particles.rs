@@ -1,8 +1,8 @@
 //! Particles on one structure against smoothers of their own.
 
-use super::dense::chart;
-use super::script::{GOOD, POOR, Script};
 use crate::geometry::Pose2;
+use crate::smoothing::tests::dense::chart;
+use crate::smoothing::tests::script::{GOOD, POOR, Script};
 use crate::smoothing::{Belief, Factor, FactorId, Smoother, Structure};
 use proptest::prelude::*;
 use rand::RngExt;

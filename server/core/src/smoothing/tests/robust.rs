@@ -1,8 +1,8 @@
 //! Graphs that are far out of shape, and digits that are far apart.
 
-use super::dense::{Graph, chart};
-use super::script::{Script, Sigma};
 use crate::geometry::Pose2;
+use crate::smoothing::tests::dense::{Graph, chart};
+use crate::smoothing::tests::script::{Script, Sigma};
 use nalgebra::Matrix3;
 use rand::RngExt;
 use std::f64::consts::PI;

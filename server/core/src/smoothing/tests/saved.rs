@@ -1,7 +1,7 @@
 //! Copies, files, and what is refused.
 
-use super::script::{GOOD, Script, information};
 use crate::geometry::Pose2;
+use crate::smoothing::tests::script::{GOOD, Script, information};
 use crate::smoothing::{Belief, Factor, JointRoom, SmoothError, Smoother, Structure};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Serialize, de::DeserializeOwned};

@@ -1,7 +1,7 @@
 //! Graphs built step by step: in the smoother, and the same in the reference.
 
-use super::dense::{Graph, Term, moved};
 use crate::geometry::Pose2;
+use crate::smoothing::tests::dense::{Graph, Term, moved};
 use crate::smoothing::{Factor, FactorId, Smoother};
 use nalgebra::{Matrix3, Vector3};
 use proptest::prelude::*;

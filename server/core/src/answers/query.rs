@@ -1,0 +1,154 @@
+//! Questions and answers over the whole posterior.
+
+use crate::edge::PlaceId;
+use crate::geometry::Pose2;
+use nalgebra::Matrix3;
+use serde::{Deserialize, Serialize};
+
+/// A question that changes nothing.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Query {
+    /// Where is what people call so? A bare name ("kitchen") or a whole question ("where is the
+    /// kitchen").
+    Where {
+        /// Name or question.
+        text: String,
+    },
+    /// All names taught so far.
+    Labels,
+    /// Places and edges of the best particle.
+    Graph,
+    /// Occupancy grid of the best particle.
+    Grid {
+        /// Edge of a cell.
+        resolution_m: f64,
+    },
+}
+
+/// The answer to a [`Query`]; an unknown name is an answer too.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub enum Answer {
+    /// To [`Query::Where`].
+    Where(WhereAnswer),
+    /// To [`Query::Labels`].
+    Labels(Vec<LabelCount>),
+    /// To [`Query::Graph`].
+    Graph(GraphAnswer),
+    /// To [`Query::Grid`].
+    Grid(Grid),
+}
+
+/// Where something is, with what probability.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WhereAnswer {
+    /// The question's text.
+    pub text: String,
+    /// The name asked for, as the map spells it (`elevator lobby`); none if the question was not
+    /// understood.
+    pub label: Option<String>,
+    /// How the name was found: `exact` or `unknown`.
+    pub via: String,
+    /// Probability that it is nowhere in the map. Sums to one with the candidates'.
+    pub p_none: f64,
+    /// Best first.
+    pub candidates: Vec<Candidate>,
+    /// Newest pose of the robot in the map, if any.
+    pub robot: Option<Pose2>,
+}
+
+/// One place that may be meant.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Candidate {
+    /// The place.
+    pub place: PlaceId,
+    /// What it is called.
+    pub label: String,
+    /// Probability that this one is meant.
+    pub probability: f64,
+    /// Probability that the name applies to it.
+    pub p_is: f64,
+    /// Its pose in the map (of the best particle).
+    pub pose: Pose2,
+    /// Covariance, x y yaw, map axes.
+    pub covariance: Matrix3<f64>,
+    /// Ids of the utterances it rests on.
+    pub because: Vec<String>,
+}
+
+/// A name and where it was given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LabelCount {
+    /// The name.
+    pub label: String,
+    /// Utterances that spoke of it.
+    pub utterances: u64,
+    /// Place that most likely bears it.
+    pub place: PlaceId,
+}
+
+/// A vertex of the best graph.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlaceView {
+    /// Its id.
+    pub id: PlaceId,
+    /// Stamp of its first scan, ns.
+    pub stamp_ns: i64,
+    /// Pose in the map.
+    pub pose: Pose2,
+    /// Names with probabilities that each applies, best first.
+    pub labels: Vec<(String, f64)>,
+}
+
+/// A loop edge (the chain of successive places is implied).
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct EdgeView {
+    /// Older place.
+    pub i: PlaceId,
+    /// Newer place.
+    pub j: PlaceId,
+    /// How it was proposed.
+    pub kind: crate::edge::EdgeKind,
+    /// Measured transform.
+    pub i_from_j: Pose2,
+}
+
+/// A distinct graph of the posterior.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ParticleView {
+    /// Particles that hold it.
+    pub count: u32,
+    /// Their weight together; all sum to one.
+    pub weight: f64,
+    /// Its loop edges.
+    pub edges: Vec<EdgeView>,
+}
+
+/// The posterior's graphs; `places` in the best one.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GraphAnswer {
+    /// +1 when coordinates jump.
+    pub epoch: u64,
+    /// +1 per change.
+    pub rev: u64,
+    /// Places of the best graph.
+    pub places: Vec<PlaceView>,
+    /// Distinct graphs, best first.
+    pub particles: Vec<ParticleView>,
+    /// 1 / Σ w² over particles.
+    pub effective_sample_size: f64,
+}
+
+/// Occupancy grid. Row 0 has the lowest y.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// Edge of a cell.
+    pub resolution_m: f64,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Pose of the lower left corner in the map.
+    pub map_from_grid: Pose2,
+    /// −1 unknown, 0 free … 100 occupied; row-major.
+    pub cells: Vec<i8>,
+}

@@ -1,0 +1,293 @@
+//! The posterior at one moment, immutable: what questions are answered from, over all particles.
+
+use crate::Query;
+use crate::answers::grid::grid;
+use crate::answers::query;
+use crate::answers::query::{
+    Answer, Candidate, EdgeView, GraphAnswer, LabelCount, ParticleView, PlaceView, WhereAnswer,
+};
+use crate::edge::PlaceId;
+use crate::edge::Vertex;
+use crate::filter::Filter;
+use crate::filter::labels::LabelId;
+use crate::filter::particle::Particle;
+use crate::filter::resample::effective_sample_size;
+use crate::geometry::Pose2;
+use crate::graph::Place;
+use crate::language::{self, Name};
+use crate::mapper::open_poses;
+use crate::smoothing::Structure;
+use crate::talk::ledger::Ledger;
+use crate::track::front::OpenPlace;
+use nalgebra::Matrix3;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Places nearer than this that bear one name are one candidate.
+const SAME_REGION_M: f64 = 6.0;
+/// Candidates told.
+const CANDIDATES_MAX: usize = 10;
+/// Names told of a place.
+const NAMES_MAX: usize = 5;
+/// Less probable names and candidates are noise.
+const PROBABILITY_MIN: f64 = 0.02;
+
+/// The posterior at one moment.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    places: Vec<Arc<Place>>,
+    open: Vec<OpenPlace>,
+    structure: Arc<Structure>,
+    particles: Vec<Particle>,
+    /// Poses of all places, open ones too, in the best particle's map.
+    poses: Vec<Pose2>,
+    ledger: Arc<Ledger>,
+    robot: Option<Pose2>,
+    epoch: u64,
+    rev: u64,
+}
+
+impl Snapshot {
+    pub(crate) fn new(
+        filter: &Filter,
+        open: Vec<OpenPlace>,
+        robot: Option<Pose2>,
+        (epoch, rev): (u64, u64),
+    ) -> Self {
+        let places = filter.graph.places().to_vec();
+        let best = filter.best();
+        let mut poses = best.belief.poses();
+        poses.extend(open_poses(best, &places, &open));
+        let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
+        Self { places, open, structure, particles, poses, ledger: filter.ledger.clone(), robot, epoch, rev }
+    }
+
+    /// +1 when the map's coordinates jump.
+    pub fn epoch(&self) -> u64 {
+        self.epoch
+    }
+
+    /// +1 per change.
+    pub fn rev(&self) -> u64 {
+        self.rev
+    }
+
+    /// Newest pose of the robot in the map.
+    pub fn robot(&self) -> Option<Pose2> {
+        self.robot
+    }
+
+    /// Answers a question; never fails: not knowing is an answer.
+    pub fn answer(&self, query: &Query) -> Answer {
+        match query {
+            Query::Where { text } => Answer::Where(self.where_is(text)),
+            Query::Labels => Answer::Labels(self.labels()),
+            Query::Graph => Answer::Graph(self.graph()),
+            Query::Grid { resolution_m } => Answer::Grid(self.grid(*resolution_m)),
+        }
+    }
+
+    /// Occupancy grid of the best particle.
+    pub fn grid(&self, resolution_m: f64) -> query::Grid {
+        let posed: Vec<(Pose2, Arc<Place>)> =
+            self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
+        grid(&posed, resolution_m)
+    }
+
+    /// All graphs; places as in the best.
+    pub fn graph(&self) -> GraphAnswer {
+        let ids = self
+            .places
+            .iter()
+            .map(|p| (p.id, p.stamp_ns))
+            .chain(self.open.iter().map(|o| (o.id, o.stamp_ns)));
+        let places = ids
+            .zip(&self.poses)
+            .enumerate()
+            .map(|(v, ((id, stamp_ns), pose))| PlaceView {
+                id,
+                stamp_ns,
+                pose: *pose,
+                labels: self.names_of(v as Vertex),
+            })
+            .collect();
+        let particles = self
+            .particles
+            .iter()
+            .map(|p| ParticleView {
+                count: p.count,
+                weight: p.weight(),
+                edges: p
+                    .edges
+                    .iter()
+                    .map(|e| EdgeView {
+                        i: PlaceId::from(e.i),
+                        j: PlaceId::from(e.j),
+                        kind: e.kind,
+                        i_from_j: e.i_from_j,
+                    })
+                    .collect(),
+            })
+            .collect();
+        GraphAnswer {
+            epoch: self.epoch,
+            rev: self.rev,
+            places,
+            particles,
+            effective_sample_size: effective_sample_size(&self.particles),
+        }
+    }
+
+    /// Every name taught and the place most likely called so.
+    pub fn labels(&self) -> Vec<LabelCount> {
+        let mut out = Vec::new();
+        for (k, label) in self.ledger.names().iter().enumerate() {
+            let applies = self.applies(k as LabelId);
+            let Some((&place, _)) = applies.iter().max_by(|a, b| a.1.total_cmp(b.1).then(b.0.cmp(a.0)))
+            else {
+                continue;
+            };
+            let mut utterances: Vec<u32> = self.particles[0]
+                .labels
+                .evidence()
+                .iter()
+                .filter(|e| e.label == k as LabelId)
+                .map(|e| e.utterance)
+                .collect();
+            utterances.sort_unstable();
+            utterances.dedup();
+            out.push(LabelCount {
+                label: label.clone(),
+                utterances: utterances.len() as u64,
+                place: PlaceId::from(place),
+            });
+        }
+        out
+    }
+
+    /// P(name applies) per place over the whole posterior.
+    fn applies(&self, label: LabelId) -> BTreeMap<Vertex, f64> {
+        let mut sum = BTreeMap::new();
+        for p in &self.particles {
+            for (v, applies) in p.labels.applies(label) {
+                *sum.entry(v).or_insert(0.0) += p.weight() * applies;
+            }
+        }
+        sum
+    }
+
+    fn names_of(&self, v: Vertex) -> Vec<(String, f64)> {
+        let mut sums: BTreeMap<LabelId, f64> = BTreeMap::new();
+        for p in &self.particles {
+            for (label, applies) in p.labels.names(v) {
+                *sums.entry(label).or_insert(0.0) += p.weight() * applies;
+            }
+        }
+        let mut names: Vec<(String, f64)> = sums
+            .into_iter()
+            .filter(|(_, p)| *p >= PROBABILITY_MIN)
+            .map(|(label, p)| (self.ledger.name(label).to_owned(), p))
+            // A tie between two places has none.
+            .filter(|(name, _)| !name.is_empty())
+            .collect();
+        names.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        names.truncate(NAMES_MAX);
+        names
+    }
+
+    /// "Where is the gym?": over all particles, which place is meant.
+    fn where_is(&self, text: &str) -> WhereAnswer {
+        let name = language::parse_query(text);
+        let label = name.as_ref().and_then(|n| self.ledger.label(n.as_str()));
+        let mut answer = WhereAnswer {
+            text: text.to_owned(),
+            label: name.map(|n: Name| n.as_str().to_owned()),
+            via: if label.is_some() { "exact" } else { "unknown" }.to_owned(),
+            p_none: 1.0,
+            candidates: Vec::new(),
+            robot: self.robot,
+        };
+        let Some(label) = label else { return answer };
+        let mut candidates = self.regions(label);
+        // The name applies nowhere only if it applies to none of them; else one of them is meant.
+        let p_none: f64 = candidates.iter().map(|c| 1.0 - c.p_is).product();
+        let sum: f64 = candidates.iter().map(|c| c.p_is).sum();
+        for c in &mut candidates {
+            c.probability = (1.0 - p_none) * c.p_is / sum.max(f64::MIN_POSITIVE);
+        }
+        candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
+        candidates.truncate(CANDIDATES_MAX);
+        answer.p_none = 1.0 - candidates.iter().map(|c| c.probability).sum::<f64>();
+        answer.candidates = candidates;
+        answer
+    }
+
+    /// Places that bear a name, near ones taken together under the likeliest.
+    fn regions(&self, label: LabelId) -> Vec<Candidate> {
+        let mut places: Vec<(Vertex, f64)> = self.applies(label).into_iter().collect();
+        places.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        let mut regions: Vec<(Vertex, f64)> = Vec::new();
+        for (v, p) in places {
+            let at = |u: Vertex| self.poses[u as usize];
+            let near = regions.iter_mut().find(|(u, _)| at(*u).distance_m(&at(v)) < SAME_REGION_M);
+            match near {
+                Some(region) => region.1 = 1.0 - (1.0 - region.1) * (1.0 - p),
+                None => regions.push((v, p)),
+            }
+        }
+        regions
+            .into_iter()
+            .filter(|(_, p)| *p >= PROBABILITY_MIN)
+            .map(|(v, p_is)| Candidate {
+                place: PlaceId::from(v),
+                label: self.ledger.name(label).to_owned(),
+                probability: p_is,
+                p_is,
+                pose: self.poses[v as usize],
+                covariance: self.covariance(v),
+                because: self.because(label, v),
+            })
+            .collect()
+    }
+
+    /// Spread of a place over the posterior, best particle's map axes: its own covariance there and
+    /// that of its position relative to the robot between particles.
+    fn covariance(&self, v: Vertex) -> Matrix3<f64> {
+        let best = &self.particles[0].belief;
+        let Some(last) = (best.len() as Vertex).checked_sub(1) else { return Matrix3::zeros() };
+        let known = v.min(last);
+        let mut sum = in_map_axes(&best.pose(known), &best.marginal(&self.structure, known));
+        if v > last {
+            return sum;
+        }
+        let here = best.pose(last);
+        for p in self.particles.iter().skip(1) {
+            let there = here.compose(&p.belief.pose(last).between(&p.belief.pose(v)));
+            let (dx, dy) = (there.x_m - self.poses[v as usize].x_m, there.y_m - self.poses[v as usize].y_m);
+            let spread = Matrix3::new(dx * dx, dx * dy, 0.0, dx * dy, dy * dy, 0.0, 0.0, 0.0, 0.0);
+            sum += p.weight() * spread;
+        }
+        sum
+    }
+
+    fn because(&self, label: LabelId, v: Vertex) -> Vec<String> {
+        let mut ids: Vec<String> = Vec::new();
+        for e in self.particles[0].labels.evidence() {
+            let near = self.poses[e.place as usize].distance_m(&self.poses[v as usize]) < SAME_REGION_M;
+            if e.label == label && near {
+                let id = self.ledger.entries().get(e.utterance as usize).map_or("", |u| &u.id);
+                if !ids.iter().any(|known| known == id) {
+                    ids.push(id.to_owned());
+                }
+            }
+        }
+        ids
+    }
+}
+
+/// Covariance of a right perturbation as that of (x, y, yaw) along the map's axes.
+fn in_map_axes(pose: &Pose2, covariance: &Matrix3<f64>) -> Matrix3<f64> {
+    // The adjoint of a pure rotation.
+    let a = Pose2::new(0.0, 0.0, pose.yaw_rad).adjoint();
+    a * covariance * a.transpose()
+}

@@ -1,0 +1,352 @@
+//! The front end: every scan against the recent ones, shared by all particles.
+//!
+//! An iterated Kalman filter on the body's pose in a local map: odometry predicts, registration
+//! to the scans of the last metres of path corrects. Its frame drifts; only its increments are
+//! used: the chain edges between successive places and each scan's pose in its place. Odometry is
+//! calibrated meanwhile (`scan/wheels.rs`), and carries the robot over stretches where the laser
+//! sees nothing; the local maps on both sides are then tied as a whole (`front/bridge.rs`).
+
+use self::bridge::Dark;
+use crate::edge::PlaceId;
+use crate::event::StampNs;
+use crate::geometry::{Pose2, wrap};
+use crate::scan::align::SIGMA_M;
+use crate::scan::place::Content;
+use crate::scan::sweep::Sweep;
+use crate::track::local::LocalMap;
+use crate::track::wheels::Wheels;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+use std::collections::VecDeque;
+
+/// The local map reaches back so far along the path; nearer places are no loop candidates.
+pub const LOCAL_PATH_M: f64 = 10.0;
+/// A place's content reaches so far to either side along the path.
+const CONTENT_REACH_M: f64 = 2.5;
+/// A scan becomes part of the local map after so much motion.
+const KEY_STEP_M: f64 = 0.25;
+const KEY_TURN_RAD: f64 = 0.35;
+/// Scans in the local map.
+const KEYS_MAX: usize = 60;
+/// A break of odometry longer than this may hide that the robot was carried off.
+const CARRIED_NS: i64 = 3_000_000_000;
+/// A scan of fewer points sees nothing.
+const SEEN_MIN: usize = 10;
+/// So much path without a look at anything is a blind stretch.
+const DARK_PATH_M: f64 = 3.0;
+/// After so much path in the dark, a pose known no better than this must not be registered to the
+/// local map: a fit would be taken for the truth.
+const VAGUE_PATH_M: f64 = 2.0;
+const VAGUE_M: f64 = 0.15;
+const VAGUE_RAD: f64 = 0.07;
+/// What each end of an increment, and the slow bend of the local map, add to it per root metre of
+/// path, as a multiple of the roughness. From simulated offices, where this is three to five times too wide
+/// (example `drives` of the server), and a real log, where it just covers: clutter errs more than noise does.
+const BEND: Vector3<f64> = Vector3::new(0.2, 0.2, 0.05);
+
+/// A scan in the local map.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+struct Key {
+    front_from_body: Pose2,
+    path_m: f64,
+    sweep: Sweep,
+}
+
+/// A place whose surroundings are still being seen.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct OpenPlace {
+    /// Its id.
+    pub id: PlaceId,
+    /// Stamp of its first scan.
+    pub stamp_ns: StampNs,
+    /// Its frame in the front end's.
+    pub front_from_place: Pose2,
+    /// Path travelled when it began.
+    pub path_m: f64,
+    /// The chain edge from the place before.
+    pub chain: Chain,
+}
+
+/// The edge from a place to the next.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Chain {
+    /// The next place in the frame of the one before.
+    pub previous_from_this: Pose2,
+    /// Its information, right perturbation.
+    pub information: Matrix3<f64>,
+    /// Whether odometry broke between the two: they are tied by next to nothing.
+    pub broken: bool,
+}
+
+/// A place that is left behind: it may now be matched.
+#[derive(Clone, Debug)]
+pub struct FrozenPlace {
+    /// Id, stamp, frame, chain.
+    pub open: OpenPlace,
+    /// What it looks like.
+    pub content: Content,
+}
+
+/// What became of a scan.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    /// The place held.
+    pub place: PlaceId,
+    /// The body in its frame.
+    pub place_from_body: Pose2,
+    /// Whether the place began with this scan.
+    pub began: bool,
+    /// Places that this scan froze, oldest first.
+    pub frozen: Vec<FrozenPlace>,
+}
+
+/// State of the front end.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FrontEnd {
+    spacing_m: f64,
+    next_place: PlaceId,
+    /// Frame of the newest place, open or frozen.
+    newest_place: Pose2,
+    front_from_body: Pose2,
+    odom_from_body: Option<Pose2>,
+    /// Of the newest scan.
+    stamp_ns: StampNs,
+    path_m: f64,
+    wheels: Wheels,
+    /// Distance of what is seen from the local map's surfaces, root mean square.
+    rough_m: f64,
+    /// Covariance of the pose in the local map.
+    in_map: Matrix3<f64>,
+    /// Covariance of the pose relative to the last place.
+    since_place: Matrix3<f64>,
+    /// Odometry broke: the next scan begins a new local map.
+    broken: bool,
+    /// The local map was begun anew: the next place is tied to the last by next to nothing.
+    fresh: bool,
+    keys: VecDeque<Key>,
+    open: VecDeque<OpenPlace>,
+    /// A blind stretch that is not dealt with yet.
+    dark: Option<Dark>,
+    /// The local map; a function of `keys`.
+    #[serde(skip)]
+    local: Option<LocalMap>,
+}
+
+impl FrontEnd {
+    /// An empty track; a place each `spacing_m` of path.
+    pub fn new(spacing_m: f64) -> Self {
+        Self {
+            spacing_m,
+            next_place: 0,
+            newest_place: Pose2::default(),
+            front_from_body: Pose2::default(),
+            odom_from_body: None,
+            stamp_ns: 0,
+            path_m: 0.0,
+            wheels: Wheels::default(),
+            rough_m: SIGMA_M,
+            in_map: Matrix3::zeros(),
+            since_place: Matrix3::zeros(),
+            broken: false,
+            fresh: false,
+            keys: VecDeque::new(),
+            open: VecDeque::new(),
+            dark: None,
+            local: None,
+        }
+    }
+
+    /// Odometry restarted or jumped: the next increment means nothing.
+    pub fn break_odometry(&mut self) {
+        self.broken = self.odom_from_body.is_some();
+    }
+
+    /// Places not yet frozen, oldest first.
+    pub fn open_places(&self) -> impl Iterator<Item = &OpenPlace> {
+        self.open.iter()
+    }
+
+    /// The body in the front end's frame.
+    pub fn front_from_body(&self) -> Pose2 {
+        self.front_from_body
+    }
+
+    /// Covariance of the body relative to the place held.
+    pub fn since_place(&self) -> Matrix3<f64> {
+        self.since_place
+    }
+
+    /// Takes a scan with the odometry at its stamp.
+    pub fn scan(&mut self, stamp_ns: StampNs, odom_from_body: Pose2, sweep: Sweep) -> Placed {
+        let mut frozen = Vec::new();
+        let blind = sweep.points.len() < SEEN_MIN;
+        if std::mem::take(&mut self.broken) {
+            let carried = stamp_ns.saturating_sub(self.stamp_ns).saturating_abs() > CARRIED_NS;
+            if carried || !self.resume(&sweep) {
+                frozen = self.start_over();
+            }
+        } else if let Some(before) = self.odom_from_body {
+            let dt_s = stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9;
+            self.predict(&before.between(&odom_from_body), dt_s);
+            if !blind && (self.is_dark() || self.is_vague()) {
+                self.land();
+                frozen = self.freeze(self.path_m);
+                self.clear_local();
+            } else {
+                self.correct(&sweep);
+            }
+        }
+        (self.odom_from_body, self.stamp_ns) = (Some(odom_from_body), stamp_ns);
+        // In the dark, places begin only after some path: until then one edge spans it, and what the
+        // next scan says of it is exactly what it is worth.
+        let hold = blind && !self.open.is_empty() && self.wheels.unseen_m() < DARK_PATH_M;
+        if blind && !hold && !self.is_dark() {
+            self.go_dark();
+        }
+        let began = !hold && self.keep_place(stamp_ns);
+        if !blind {
+            self.keep_key(sweep);
+        }
+        if began {
+            self.bridge();
+        }
+        frozen.extend(self.freeze(self.path_m - CONTENT_REACH_M));
+        let (place, place_from_body) = self
+            .open
+            .back()
+            .map_or((0, Pose2::default()), |p| (p.id, p.front_from_place.between(&self.front_from_body)));
+        Placed { place, place_from_body, began, frozen }
+    }
+
+    /// Freezes every place that began at or before a point of the path.
+    pub fn freeze(&mut self, path_m: f64) -> Vec<FrozenPlace> {
+        let mut frozen = Vec::new();
+        let all = path_m == f64::INFINITY;
+        // The place held must stay, to hold the next scans.
+        let may = |front: &Self, p: &OpenPlace| {
+            p.path_m <= path_m && front.open.len() > 1 && !front.is_held_back(p.id)
+        };
+        while self.open.front().is_some_and(|p| all || may(self, p)) {
+            let Some(open) = self.open.pop_front() else { break };
+            let near = |k: &&Key| (k.path_m - open.path_m).abs() <= CONTENT_REACH_M;
+            let content = content(self.keys.iter().filter(near), &open.front_from_place);
+            frozen.push(FrozenPlace { open, content });
+        }
+        if all {
+            self.dark = None;
+        }
+        frozen
+    }
+
+    fn predict(&mut self, increment: &Pose2, dt_s: f64) {
+        let (increment, q) = self.wheels.drive(increment, dt_s);
+        let f = increment.inverse().adjoint();
+        self.in_map = f * self.in_map * f.transpose() + q;
+        self.since_place = f * self.since_place * f.transpose() + q;
+        self.front_from_body = self.front_from_body.compose(&increment);
+        self.path_m += increment.x_m.hypot(increment.y_m);
+    }
+
+    /// Whether the robot drove on blindly until its pose in the local map was too uncertain for a
+    /// fit there to be believed.
+    fn is_vague(&self) -> bool {
+        let (d2, yaw2) = (self.in_map[(0, 0)].max(self.in_map[(1, 1)]), self.in_map[(2, 2)]);
+        self.wheels.unseen_m() > VAGUE_PATH_M && (d2 > VAGUE_M.powi(2) || yaw2 > VAGUE_RAD.powi(2))
+    }
+
+    /// Leaves the local map behind: so far along the path that none of its places is taken for part
+    /// of the new one.
+    fn clear_local(&mut self) {
+        self.keys.clear();
+        self.local = None;
+        self.path_m += 2.0 * LOCAL_PATH_M;
+        self.in_map = Matrix3::zeros();
+        self.wheels.lift();
+    }
+
+    /// The link to what was is lost: a new local map, and a chain edge that says next to nothing.
+    /// Whether the robot is still where it was is for the particles to find out: a scan that fits
+    /// the old local map may be a look-alike that it was carried to.
+    fn start_over(&mut self) -> Vec<FrozenPlace> {
+        let frozen = self.freeze(f64::INFINITY);
+        self.fresh = true;
+        self.clear_local();
+        self.since_place = Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0));
+        frozen
+    }
+
+    /// Begins a place where the last one is far enough behind.
+    fn keep_place(&mut self, stamp_ns: StampNs) -> bool {
+        let last = self.open.back();
+        if last.is_some_and(|p| self.path_m - p.path_m < self.spacing_m) {
+            return false;
+        }
+        let broken = std::mem::take(&mut self.fresh);
+        let previous_from_this = self.newest_place.between(&self.front_from_body);
+        self.newest_place = self.front_from_body;
+        let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
+        let bend = Matrix3::from_diagonal(&BEND.component_mul(&BEND)) * ((1.0 + d_m) * self.rough_m.powi(2));
+        let information = (self.since_place + bend).try_inverse().unwrap_or_else(Matrix3::identity);
+        let chain = Chain { previous_from_this, information, broken };
+        self.open.push_back(OpenPlace {
+            id: self.next_place,
+            stamp_ns,
+            front_from_place: self.front_from_body,
+            path_m: self.path_m,
+            chain,
+        });
+        self.next_place += 1;
+        self.since_place = Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-6, 1e-7));
+        true
+    }
+
+    /// Adds the scan to the local map if it shows it from a pose new to the last metres of path: what
+    /// is older leaves both the local map and the places to come.
+    fn keep_key(&mut self, sweep: Sweep) {
+        let near = |k: &Key| {
+            self.path_m - k.path_m < CONTENT_REACH_M
+                && k.front_from_body.distance_m(&self.front_from_body) < KEY_STEP_M
+                && wrap(k.front_from_body.yaw_rad - self.front_from_body.yaw_rad).abs() < KEY_TURN_RAD
+        };
+        if sweep.points.is_empty() || self.keys.iter().rev().take(KEYS_MAX / 2).any(near) {
+            return;
+        }
+        self.keys.push_back(Key { front_from_body: self.front_from_body, path_m: self.path_m, sweep });
+        let keep_from_m = self.path_m - LOCAL_PATH_M;
+        let gone = |keys: &VecDeque<Key>| {
+            keys.len() > KEYS_MAX || keys.front().is_some_and(|k| k.path_m < keep_from_m)
+        };
+        let mut left = Vec::new();
+        while gone(&self.keys) {
+            left.extend(self.keys.pop_front());
+        }
+        if let (Some(local), Some(new)) = (&mut self.local, self.keys.back()) {
+            local.add(&new.sweep.points, &new.front_from_body, new.path_m);
+            for key in left {
+                local.take_away(&key.sweep.points, &key.front_from_body, key.path_m);
+            }
+        }
+    }
+
+    fn local(&mut self) -> &LocalMap {
+        let keys = &self.keys;
+        self.local.get_or_insert_with(|| {
+            let mut local = LocalMap::default();
+            for key in keys {
+                local.add(&key.sweep.points, &key.front_from_body, key.path_m);
+            }
+            local
+        })
+    }
+}
+
+/// What some scans show, in a frame.
+fn content<'a>(keys: impl Iterator<Item = &'a Key>, front_from_frame: &Pose2) -> Content {
+    let sweeps: Vec<_> = keys.map(|k| (front_from_frame.between(&k.front_from_body), &k.sweep)).collect();
+    Content::new(&sweeps)
+}
+
+mod bridge;
+mod registration;
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,107 @@
+//! A scan laid on the local map, and what that is worth.
+
+use crate::geometry::Pose2;
+use crate::scan::align::{Alignment, CORRELATED_BEAMS, Prior, SIGMA_M, align};
+use crate::scan::cloud::{Point, thin};
+use crate::scan::place::VOXEL_M;
+use crate::scan::sweep::Sweep;
+use crate::track::front::FrontEnd;
+use nalgebra::{Matrix3, Vector3};
+
+/// Largest distance between a point and its surface when registration begins.
+const GATE_M: f32 = 0.6;
+/// Share of a scan's points on known surfaces below which the fit is looked at twice.
+const SHARE_SURE: f64 = 0.6;
+/// Below it the scan says nothing about the pose.
+const SHARE_MIN: f64 = 0.25;
+/// Wheels err with a bias (a scale, a bent axle), and fused at each scan a bias adds up: odometry
+/// decides only where the scans say next to nothing.
+const ODOMETRY_TRUST: f64 = 0.02;
+/// There it counts for more: in a bare corridor the legs of a guide who walks ahead may be all that
+/// the scans show along it, and they say that the robot stands still. More mends simulated corridors
+/// and harms real tours with a range of 8 m.
+const ODOMETRY_TRUST_ALONE: f64 = 0.2;
+/// What the local map itself may be wrong by where surfaces are [`SIGMA_M`] rough.
+const MAP_SIGMAS: Vector3<f64> = Vector3::new(0.005, 0.005, 0.002);
+/// How fast the roughness of what is seen is learned, per scan.
+const ROUGH_GAIN: f64 = 0.02;
+/// Along a surface, errors within so much are one.
+const LOOK_M: f64 = 0.4;
+/// Scans from nearly the same spot err alike: one independent look takes so much path.
+const LOOK_PATH_M: f64 = 2.0;
+/// … and a turn of a radian as much as so much path.
+const LOOK_PATH_PER_RAD_M: f64 = 2.0;
+
+impl FrontEnd {
+    /// Registers the scan to the local map around the prediction; what it says is fused.
+    pub(crate) fn correct(&mut self, sweep: &Sweep) {
+        let Some(information) = self.in_map.try_inverse() else { return };
+        let prior = Prior {
+            target_from_source: self.front_from_body,
+            information: information * ODOMETRY_TRUST,
+            where_weak: ODOMETRY_TRUST_ALONE / ODOMETRY_TRUST,
+        };
+        let points = thin(&sweep.points, VOXEL_M);
+        let moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
+        let Some(found) = self.register(&points, &prior) else { return };
+        self.front_from_body = found.target_from_source;
+        self.rough_m += ROUGH_GAIN * (found.residual_m - self.rough_m);
+        let rough = (self.rough_m / SIGMA_M).powi(2);
+        // So many independent looks at surfaces, however dense the beams.
+        let per_point = surfaces_m(sweep) / LOOK_M / points.len() as f64;
+        let look = found.information * (CORRELATED_BEAMS * per_point / rough);
+        let map = Matrix3::from_diagonal(&MAP_SIGMAS.component_mul(&MAP_SIGMAS)) * rough;
+        let fuse = |p: &Matrix3<f64>, look: Matrix3<f64>| -> Option<Matrix3<f64>> {
+            (p.try_inverse()? + look).try_inverse().map(|m| (m + m.transpose()) * 0.5)
+        };
+        self.in_map = fuse(&self.in_map, look).map_or(self.in_map, |m| m + map);
+        let news = (moved_m / LOOK_PATH_M).min(1.0);
+        self.since_place = fuse(&self.since_place, look * news).unwrap_or(self.since_place);
+        self.wheels.told(&self.front_from_body, &self.in_map);
+    }
+
+    fn register(&mut self, points: &[Point], prior: &Prior) -> Option<Alignment> {
+        let guess = prior.target_from_source;
+        let local = self.local();
+        let mut best = align(points, local, &guess, Some(prior), GATE_M);
+        if best.is_none_or(|b| b.inlier_share < SHARE_SURE) {
+            // A fast turn or a slip: start from other headings too.
+            for turn_rad in [-0.1, 0.1, -0.2, 0.2, -0.35, 0.35] {
+                let turned = guess.compose(&Pose2::new(0.0, 0.0, turn_rad));
+                let other = align(points, local, &turned, Some(prior), GATE_M);
+                if let Some(o) = other
+                    && best.is_none_or(|b| o.inlier_share > b.inlier_share + 0.05)
+                {
+                    best = other;
+                }
+            }
+        }
+        best.filter(|b| b.inlier_share >= SHARE_MIN)
+    }
+
+    /// After a break too short for the robot to have been carried off: where in the local map is it
+    /// now, whatever its odometry says?
+    pub(crate) fn resume(&mut self, sweep: &Sweep) -> bool {
+        let points = thin(&sweep.points, VOXEL_M);
+        let wide = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
+        let here = self.front_from_body;
+        let local = self.local();
+        let found = (0..18)
+            .filter_map(|k| {
+                let guess = here.compose(&Pose2::new(0.0, 0.0, f64::from(k) * 0.35));
+                let prior = Prior { target_from_source: guess, information: wide, where_weak: 1.0 };
+                align(&points, local, &guess, Some(&prior), GATE_M)
+            })
+            .max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
+        let Some(found) = found.filter(|f| f.inlier_share >= SHARE_SURE) else { return false };
+        self.front_from_body = found.target_from_source;
+        self.wheels.lift();
+        true
+    }
+}
+
+/// Length of the surfaces that a sweep shows, metres: a point stands for no more than [`LOOK_M`].
+fn surfaces_m(sweep: &Sweep) -> f64 {
+    let gap = |p: &[Point]| f64::from((p[0].x - p[1].x).powi(2) + (p[0].y - p[1].y).powi(2)).sqrt();
+    sweep.points.windows(2).map(|p| gap(p).min(LOOK_M)).sum()
+}
