@@ -4,8 +4,7 @@
 //! annotator against us and against the second. `--show N` prints the n-th text's clauses.
 
 use std::collections::BTreeMap;
-use toponym_core::language::Clause;
-use toponym_core::language::clauses;
+use toponym_core::language::{Clause, clauses};
 
 type Span = Option<(u64, u64)>;
 /// Verb, relation, landmark.

@@ -6,8 +6,7 @@
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};
-use toponym_core::language::parse;
-use toponym_core::language::words;
+use toponym_core::language::{parse, words};
 
 fn main() -> io::Result<()> {
     let mut arguments = std::env::args().skip(1);

@@ -14,6 +14,13 @@ pub enum Rules {
     Paper,
 }
 
+impl Rules {
+    /// Whether sentences are taken in as the paper does.
+    pub fn by_paper(self) -> bool {
+        self == Self::Paper
+    }
+}
+
 /// Settings of a [`crate::Mapper`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -30,8 +37,6 @@ pub struct Config {
     pub semantic_edges: bool,
     /// Whether older places are looked at at all: without, the map is the front end's.
     pub loops: bool,
-    /// Share of the matched loop transforms that are replaced by random ones, to try the filter.
-    pub inject_loops: f64,
     /// Path between successive places.
     pub place_spacing_m: f64,
     /// γ of eq. (6).
@@ -49,7 +54,6 @@ impl Default for Config {
             rules: Rules::Toponym,
             semantic_edges: true,
             loops: true,
-            inject_loops: 0.0,
             place_spacing_m: 1.0,
             gamma_per_m2: 0.2,
             resample_below: 0.5,

@@ -1,7 +1,6 @@
 //! What an event brought about: the one source of reports, feedback and debugging.
 
-use crate::edge::Proposal;
-use crate::edge::{EdgeKind, PlaceId};
+use crate::edge::{EdgeKind, PlaceId, Proposal};
 use crate::event::StampNs;
 use crate::geometry::Pose2;
 use nalgebra::Matrix3;

@@ -20,7 +20,6 @@ pub mod event;
 pub mod filter;
 pub mod geometry;
 pub mod graph;
-pub mod inject;
 pub mod language;
 pub mod mapper;
 pub mod random;
@@ -28,6 +27,7 @@ pub mod scan;
 pub mod smoothing;
 pub mod talk;
 pub mod track;
+pub mod trial;
 mod wide;
 
 pub use answers::query::{Answer, Query};

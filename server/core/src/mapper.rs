@@ -1,50 +1,37 @@
 //! The core's public face: events in, effects out.
 
-use crate::answers::snapshot::Snapshot;
+use crate::answers::snapshot::{Snapshot, open_poses};
 use crate::edge::Vertex;
 use crate::effects::{Effect, Effects, TrackState};
-use crate::event::{Laser, Odom, Scan, Setup, StampNs, Utterance};
+use crate::event::{Odom, Scan, StampNs, Utterance};
 use crate::filter::Filter;
 use crate::filter::particle::{Edge, Particle};
 use crate::filter::propose::is_lost;
 use crate::geometry::Pose2;
-use crate::graph::{Graph, Place};
-use crate::scan::sweep::sweep;
+use crate::graph::Graph;
 use crate::smoothing::SmoothError;
-use crate::talk::listen::Here;
-use crate::track::front::{FrontEnd, FrozenPlace, OpenPlace};
-use crate::track::odometry::{Odometry, Step};
+use crate::talk::{Here, Talk};
+use crate::track::Track;
+use crate::track::front::{FrozenPlace, OpenPlace};
+use crate::trial::Trial;
 use crate::{Answer, Config, Event, Query};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, VecDeque};
 use std::sync::Arc;
-
-/// Scans that wait for odometry to bracket their sweep.
-const WAITING_MAX: usize = 64;
-/// A scan waits for odometry no longer than this, in stamps of the odometry or of later scans.
-const WAIT_NS: i64 = 500_000_000;
 
 /// One map and the robot on it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mapper {
-    filter: Filter,
     track: Track,
+    filter: Filter,
+    talk: Talk,
     /// +1 when coordinates jump.
     epoch: u64,
     /// +1 per change.
     rev: u64,
-}
-
-/// The robot's streams, up to the places they make.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-struct Track {
-    lasers: BTreeMap<String, Laser>,
-    odometry: Odometry,
-    waiting: VecDeque<Scan>,
-    front: FrontEnd,
-    scans: u64,
-    odom_from_body: Option<Pose2>,
+    /// What is spoilt on purpose; goes with a restart.
+    #[serde(skip)]
+    trial: Trial,
 }
 
 /// A saved map could not be written or read.
@@ -70,7 +57,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 6 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 7 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -80,16 +67,13 @@ fn format_here() -> String {
 impl Mapper {
     /// An empty map.
     pub fn new(config: Config) -> Self {
-        let front = FrontEnd::new(config.place_spacing_m);
-        let track = Track {
-            lasers: BTreeMap::new(),
-            odometry: Odometry::default(),
-            waiting: VecDeque::new(),
-            front,
-            scans: 0,
-            odom_from_body: None,
-        };
-        Self { filter: Filter::new(config), track, epoch: 0, rev: 0 }
+        Self::on_trial(config, Trial::default())
+    }
+
+    /// An empty map for which some of what is measured will be spoilt.
+    pub fn on_trial(config: Config, trial: Trial) -> Self {
+        let track = Track::new(config.place_spacing_m);
+        Self { track, filter: Filter::new(config), talk: Talk::default(), epoch: 0, rev: 0, trial }
     }
 
     /// Takes one event.
@@ -101,7 +85,7 @@ impl Mapper {
             Event::Scan(scan) => self.scan(scan, &mut effects),
             Event::Utterance(utterance) => self.hear(&utterance, &mut effects),
             Event::Command(command) => {
-                self.change(&mut effects, |filter| vec![Effect::Mended(filter.mend(&command))]);
+                self.change(&mut effects, |filter, talk| vec![Effect::Mended(talk.mend(filter, &command))]);
             }
             Event::Flush => self.flush(&mut effects),
         }
@@ -117,6 +101,7 @@ impl Mapper {
     pub fn snapshot(&self) -> Arc<Snapshot> {
         Arc::new(Snapshot::new(
             &self.filter,
+            self.talk.ledger.clone(),
             self.track.front.open_places().cloned().collect(),
             self.map_from_body(),
             (self.epoch, self.rev),
@@ -153,88 +138,44 @@ impl Mapper {
     }
 
     fn odom(&mut self, odom: &Odom, effects: &mut Effects) {
-        if let Step::Broken(reason) = self.track.odometry.push(odom) {
-            // What still waits belongs to the old segment, whose odometry is gone.
-            for scan in self.track.waiting.drain(..) {
-                let reason = "odometry broke before it covered the sweep".to_owned();
-                effects.push(Effect::ScanDropped { stamp_ns: scan.stamp_ns, reason });
-            }
-            self.track.front.break_odometry();
-            effects.push(Effect::SegmentBegan { stamp_ns: odom.stamp_ns, reason });
-        }
+        self.track.odom(odom, effects);
         self.place_waiting(Some(odom.stamp_ns), effects);
     }
 
     fn scan(&mut self, scan: Scan, effects: &mut Effects) {
-        if !self.track.lasers.contains_key(&scan.laser) {
-            let reason = format!("laser {:?} was never set up", scan.laser);
-            effects.push(Effect::ScanDropped { stamp_ns: scan.stamp_ns, reason });
-            return;
-        }
         let now_ns = scan.stamp_ns;
-        self.track.waiting.push_back(scan);
+        self.track.scan(scan, effects);
         self.place_waiting(Some(now_ns), effects);
     }
 
     /// Places the scans that odometry brackets, or whose time is up. None: all of them.
     fn place_waiting(&mut self, now_ns: Option<StampNs>, effects: &mut Effects) {
-        while let Some(scan) = self.track.waiting.front() {
-            let end_ns = sweep_end_ns(scan);
-            let bracketed = self.track.odometry.newest_ns().is_some_and(|newest| newest >= end_ns);
-            let late = now_ns.is_none_or(|now| now.saturating_sub(end_ns) > WAIT_NS);
-            if !(bracketed || late || self.track.waiting.len() > WAITING_MAX) {
-                return;
-            }
-            if let Some(scan) = self.track.waiting.pop_front() {
-                self.place(&scan, effects);
+        while let Some(scan) = self.track.next_due(now_ns) {
+            if let Some(placed) = self.track.place(&scan, effects) {
+                self.rev += u64::from(placed.began);
+                self.grow(placed.frozen, effects);
+                effects.push(self.tracked(scan.stamp_ns, placed.odom_from_body));
             }
         }
     }
 
-    fn place(&mut self, scan: &Scan, effects: &mut Effects) {
-        let stamp_ns = scan.stamp_ns;
-        let Some(odom_from_body) = self.track.odometry.at(stamp_ns) else {
-            let reason = "no odometry yet".to_owned();
-            effects.push(Effect::ScanDropped { stamp_ns, reason });
-            return;
-        };
-        let Some(laser) = self.track.lasers.get(&scan.laser) else { return };
-        let odometry = &self.track.odometry;
-        let motion = |dt_s: f64| {
-            odometry
-                .at(stamp_ns.saturating_add((dt_s * 1e9) as i64))
-                .map_or(Pose2::default(), |p| odom_from_body.between(&p))
-        };
-        let sweep = sweep(scan, laser, motion);
-        let placed = self.track.front.scan(stamp_ns, odom_from_body, sweep);
-        self.track.odom_from_body = Some(odom_from_body);
-        effects.push(Effect::ScanPlaced {
-            scan: self.track.scans,
-            stamp_ns,
-            place: placed.place,
-            place_from_body: placed.place_from_body,
-            odom_from_body,
-        });
-        self.track.scans += 1;
-        if placed.began {
-            effects.push(Effect::PlaceBegan { place: placed.place, stamp_ns });
-            self.rev += 1;
-        }
-        self.grow(placed.frozen, effects);
-        effects.push(self.tracked(stamp_ns, odom_from_body));
-    }
-
-    /// Algorithm 1 for each place just left.
+    /// Algorithm 1 for each place just left, and what was described is looked for in the map as it is now.
     fn grow(&mut self, frozen: Vec<FrozenPlace>, effects: &mut Effects) {
+        let trial = self.trial.clone();
         for place in frozen {
-            self.change(effects, |filter| filter.step(place));
+            self.change(effects, |filter, talk| {
+                let effects = filter.step(place, &|t, measured| trial.spoil(t, &mut measured.fits));
+                trial.force(filter);
+                talk.reground(filter);
+                effects
+            });
         }
     }
 
     /// Changes the posterior. Where another particle is best then, the map's coordinates jump.
-    fn change(&mut self, effects: &mut Effects, change: impl FnOnce(&mut Filter) -> Effects) {
+    fn change(&mut self, effects: &mut Effects, change: impl FnOnce(&mut Filter, &mut Talk) -> Effects) {
         let (before, edges) = (self.map_from_body(), self.filter.best().edges.clone());
-        effects.extend(change(&mut self.filter));
+        effects.extend(change(&mut self.filter, &mut self.talk));
         self.rev += 1;
         if !continues(&edges, &self.filter.best().edges)
             && let (Some(old), Some(new)) = (before, self.map_from_body())
@@ -258,14 +199,17 @@ impl Mapper {
             poses
         };
         let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m };
-        self.change(effects, |filter| vec![Effect::Heard(filter.hear(u, &here))]);
+        self.change(effects, |filter, talk| vec![Effect::Heard(talk.hear(filter, u, &here))]);
     }
 
     fn flush(&mut self, effects: &mut Effects) {
         self.place_waiting(None, effects);
         let frozen = self.track.front.freeze(f64::INFINITY);
         self.grow(frozen, effects);
-        self.change(effects, Filter::finish);
+        self.change(effects, |filter, talk| {
+            talk.reground_all(filter);
+            filter.finish()
+        });
     }
 
     /// The robot in the best particle's map.
@@ -322,28 +266,6 @@ impl Mapper {
     }
 }
 
-impl Track {
-    fn set_up(&mut self, setup: Setup) {
-        self.lasers = setup.lasers.into_iter().map(|l| (l.id.clone(), l)).collect();
-    }
-}
-
-/// Poses, in a particle's map, of the places that are not frozen yet.
-pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> {
-    let last = p.belief.len().checked_sub(1).map(|v| v as Vertex);
-    let map_from_front = match (last, open.first()) {
-        (Some(v), _) => p.belief.pose(v).compose(&places[v as usize].front_from_place.inverse()),
-        (None, Some(first)) => first.front_from_place.inverse(),
-        (None, None) => Pose2::default(),
-    };
-    open.iter().map(|o| map_from_front.compose(&o.front_from_place)).collect()
-}
-
-fn sweep_end_ns(scan: &Scan) -> StampNs {
-    let beams = scan.ranges_m.len().saturating_sub(1) as f64;
-    scan.stamp_ns.saturating_add((scan.time_increment_s.max(0.0) * beams * 1e9) as i64)
-}
-
 /// Whether a graph is another one with edges added.
 fn continues(before: &[Edge], after: &[Edge]) -> bool {
     after.len() >= before.len() && after.iter().zip(before).all(|(a, b)| a == b)
@@ -353,6 +275,7 @@ fn continues(before: &[Edge], after: &[Edge]) -> bool {
 mod tests {
     use super::*;
     use crate::edge::EdgeKind;
+    use crate::event::{Laser, Setup};
 
     #[test]
     fn whatever_makes_another_particle_the_best_tells_that_coordinates_jump() {
@@ -390,9 +313,9 @@ mod tests {
         let other = mapper.filter.best().clone();
         mapper.filter.particles = vec![Particle { edges: Arc::new(vec![edge]), ..other.clone() }, other];
         let mut effects = Effects::new();
-        mapper.change(&mut effects, |_| Effects::new());
+        mapper.change(&mut effects, |_, _| Effects::new());
         assert_eq!((effects.len(), mapper.epoch), (0, 0));
-        mapper.change(&mut effects, |filter| {
+        mapper.change(&mut effects, |filter, _| {
             filter.particles.swap(0, 1);
             Effects::new()
         });

@@ -21,8 +21,7 @@ use rand::{SeedableRng, seq::SliceRandom};
 use rand_chacha::ChaCha8Rng;
 use std::fmt::Write;
 use std::path::PathBuf;
-use toponym_core::language::path_features;
-use toponym_core::language::{FEATURES, Relation};
+use toponym_core::language::{FEATURES, Relation, path_features};
 
 /// Settings are split into so many parts.
 const FOLDS: usize = 5;

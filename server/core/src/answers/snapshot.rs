@@ -1,13 +1,10 @@
 //! The posterior at one moment, immutable: what questions are answered from, over all particles.
 
-use crate::Query;
 use crate::answers::grid::grid;
-use crate::answers::query;
 use crate::answers::query::{
-    Answer, Candidate, EdgeView, GraphAnswer, LabelCount, ParticleView, PlaceView, WhereAnswer,
+    Answer, Candidate, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query, WhereAnswer,
 };
-use crate::edge::PlaceId;
-use crate::edge::Vertex;
+use crate::edge::{PlaceId, Vertex};
 use crate::filter::Filter;
 use crate::filter::labels::LabelId;
 use crate::filter::particle::Particle;
@@ -15,7 +12,6 @@ use crate::filter::resample::effective_sample_size;
 use crate::geometry::Pose2;
 use crate::graph::Place;
 use crate::language::{self, Name};
-use crate::mapper::open_poses;
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::front::OpenPlace;
@@ -50,6 +46,7 @@ pub struct Snapshot {
 impl Snapshot {
     pub(crate) fn new(
         filter: &Filter,
+        ledger: Arc<Ledger>,
         open: Vec<OpenPlace>,
         robot: Option<Pose2>,
         (epoch, rev): (u64, u64),
@@ -59,7 +56,7 @@ impl Snapshot {
         let mut poses = best.belief.poses();
         poses.extend(open_poses(best, &places, &open));
         let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
-        Self { places, open, structure, particles, poses, ledger: filter.ledger.clone(), robot, epoch, rev }
+        Self { places, open, structure, particles, poses, ledger, robot, epoch, rev }
     }
 
     /// +1 when the map's coordinates jump.
@@ -88,7 +85,7 @@ impl Snapshot {
     }
 
     /// Occupancy grid of the best particle.
-    pub fn grid(&self, resolution_m: f64) -> query::Grid {
+    pub fn grid(&self, resolution_m: f64) -> Grid {
         let posed: Vec<(Pose2, Arc<Place>)> =
             self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
         grid(&posed, resolution_m)
@@ -290,4 +287,15 @@ fn in_map_axes(pose: &Pose2, covariance: &Matrix3<f64>) -> Matrix3<f64> {
     // The adjoint of a pure rotation.
     let a = Pose2::new(0.0, 0.0, pose.yaw_rad).adjoint();
     a * covariance * a.transpose()
+}
+
+/// Poses, in a particle's map, of the places that are not frozen yet.
+pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> {
+    let last = p.belief.len().checked_sub(1).map(|v| v as Vertex);
+    let map_from_front = match (last, open.first()) {
+        (Some(v), _) => p.belief.pose(v).compose(&places[v as usize].front_from_place.inverse()),
+        (None, Some(first)) => first.front_from_place.inverse(),
+        (None, None) => Pose2::default(),
+    };
+    open.iter().map(|o| map_from_front.compose(&o.front_from_place)).collect()
 }

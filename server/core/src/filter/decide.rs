@@ -1,8 +1,6 @@
 //! Steps 1 and 4 for one particle: what becomes of it, given what it thinks of a fit; see [`crate::filter::weigh`].
 
-use crate::edge::EdgeKind;
-use crate::edge::RevisitId;
-use crate::edge::Vertex;
+use crate::edge::{EdgeKind, RevisitId, Vertex};
 use crate::filter::loops::Fit;
 use crate::filter::particle::{Edge, Particle};
 use crate::filter::weigh::Judgement;
@@ -16,7 +14,7 @@ const CERTAIN: f64 = 1e-2;
 const CERTAIN_SAID: f64 = 1e-4;
 /// Places' content overlaps along the path: an edge per place uses each scan some three times, so
 /// its information is a third.
-const SHARED_SCANS: f64 = 3.0;
+pub(crate) const SHARED_SCANS: f64 = 3.0;
 /// Cap on what one fit may say for or against a particle.
 const LOG_WEIGHT_STEP_MAX: f64 = 4.0 * LN_10;
 /// A loop raises `Σ eᵀ Ω e` by its distance² at most, and none is drawn beyond some hundred: where it
@@ -137,27 +135,11 @@ fn with_edge(mut particle: Particle, structure: &Structure, edge: &Edge) -> Opti
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
-    use crate::filter::chance::log_looks;
-    use crate::filter::weigh::judge_alone;
+    use crate::filter::weigh::tests::{chain, fit};
     use crate::geometry::Pose2;
-    use crate::scan::matching::Mode;
-    use nalgebra::{Matrix3, Vector3};
     use std::sync::Arc;
-
-    /// A chain of n places 1 m apart, straight on, that has drifted by `sigma_m` per place.
-    pub(crate) fn chain(n: u32, sigma_m: f64) -> (Structure, Particle) {
-        let (mut structure, mut p) = (Structure::new(), Particle::empty(10));
-        let covariance = Matrix3::from_diagonal(&Vector3::new(sigma_m.powi(2), sigma_m.powi(2), 1e-6));
-        let information = covariance.try_inverse().unwrap();
-        for _ in 0..n {
-            structure.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
-        }
-        structure.arrange();
-        p.update(&structure).unwrap();
-        (structure, p)
-    }
 
     /// What becomes of a chain of 21 and a fit of its two ends.
     fn decided(fit: &Fit, judgement: Judgement, relief: f64) -> Choice {
@@ -166,12 +148,6 @@ pub(crate) mod tests {
         let edge = add_edge(&mut structure, fit, 0, 20);
         choice.take(&structure, edge.as_ref());
         choice
-    }
-
-    pub(crate) fn fit(x_m: f64, score: f64, support: u32) -> Fit {
-        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
-        let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score, overlap: 0.6 };
-        Fit::supported_by(0, mode, EdgeKind::Distance, support)
     }
 
     #[test]
@@ -193,19 +169,6 @@ pub(crate) mod tests {
             assert!((taken.weight() - posterior).abs() < 1e-12);
             assert!((refused.weight() - (1.0 - posterior)).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn adding_an_edge_that_was_predicted_gains_a_particle_nothing_over_its_twin() {
-        // Two equal particles meet the same fit; what one takes must not weigh more than what the
-        // prediction of both already said: their sum is the weight before.
-        let (structure, p) = chain(21, 0.1);
-        let f = fit(20.0, 0.95, 5);
-        let judgement = judge_alone(&structure, &p, &f, 20, log_looks(&f, 1), 0.2).unwrap();
-        let before = p.weight();
-        let choice = decided(&f, judgement, judgement.log_evidence);
-        let after: f64 = [choice.taken, choice.refused].iter().flatten().map(Particle::weight).sum();
-        assert!((after - before).abs() < 1e-12);
     }
 
     #[test]

@@ -19,26 +19,27 @@
 //!   other, and neighbouring places show the same walls. What a place may change log w by is ln ε / s.
 
 use crate::edge::Vertex;
+use crate::filter::decide::SHARED_SCANS;
 use crate::filter::particle::Particle;
+use crate::filter::propose::SPREAD_M;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
-use crate::scan::agree::{Look, agreement};
+use crate::scan::agree::agreement;
+use crate::scan::view::Closeness;
 use crate::smoothing::{Relative, Structure};
 use crate::track::front::LOCAL_PATH_M;
 use rayon::prelude::*;
 
 /// Older places that the newest one is compared with, at most …
 const COMPARED_MAX: usize = 3;
-/// … which lie so near in the map …
-const NEAR_M: f64 = 5.0;
-/// … and so far apart along the path: their content overlaps otherwise.
-const SPREAD_M: f64 = 2.0;
+/// … which lie so near in the map, [`SPREAD_M`] apart along the path.
+const COMPARED_M: f64 = 5.0;
 /// Points of either place, and range images that they are looked up in.
 const POINTS: usize = 24;
 const VIEWS: usize = 3;
 /// Relative poses less certain than this predict nothing …
-const SIGMA_MAX_M: f64 = 0.3;
-const SIGMA_MAX_RAD: f64 = 0.05;
+const COMPARED_SIGMA_MAX_M: f64 = 0.3;
+const COMPARED_SIGMA_MAX_RAD: f64 = 0.05;
 /// … and more certain ones may be off by so many standard deviations.
 const SIGMAS: f64 = 2.0;
 // The next three are from simulated offices and apartments, half of them with people about (example
@@ -53,8 +54,6 @@ const SEEN_UNRELATED: f64 = 0.66;
 const TEMPER: f64 = 0.4;
 /// ε. Set by reasoning: doors, chairs and people change less than a place's every wall.
 const CHANGED: f64 = 0.02;
-/// s. As for fits: a place's content is seen from some three places.
-const SHARED_SCANS: f64 = 3.0;
 
 /// Weighs each graph by what place `t` sees of the older places that the graph lays it over. A single graph
 /// needs no weighing.
@@ -77,7 +76,7 @@ pub fn nearest(graph: &Graph, t: Vertex, pose: impl Fn(Vertex) -> Pose2) -> Vec<
     let mut near: Vec<(f64, Vertex)> = (0..t)
         .filter(|&i| graph.apart(i, t, LOCAL_PATH_M))
         .map(|i| (pose(i).distance_m(&here), i))
-        .filter(|(d, _)| *d < NEAR_M)
+        .filter(|(d, _)| *d < COMPARED_M)
         .collect();
     near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     let mut chosen: Vec<Vertex> = Vec::with_capacity(COMPARED_MAX);
@@ -113,13 +112,13 @@ pub fn compare(graph: &Graph, t: Vertex, predicted: &[Relative]) -> Option<Overl
 }
 
 /// How closely a prediction can be compared, if at all.
-fn look(r: &Relative) -> Option<Look> {
+fn look(r: &Relative) -> Option<Closeness> {
     let (sigma_m, sigma_rad) = (r.sigma_m(), r.sigma_rad());
-    (sigma_m < SIGMA_MAX_M && sigma_rad < SIGMA_MAX_RAD).then_some(Look {
+    (sigma_m < COMPARED_SIGMA_MAX_M && sigma_rad < COMPARED_SIGMA_MAX_RAD).then_some(Closeness {
         points_max: POINTS,
         views_max: VIEWS,
-        tolerance_m: Look::CLOSE.tolerance_m + SIGMAS * sigma_m,
-        tolerance_per_m: Look::CLOSE.tolerance_per_m + SIGMAS * sigma_rad,
+        tolerance_m: Closeness::CLOSE.tolerance_m + SIGMAS * sigma_m,
+        tolerance_per_m: Closeness::CLOSE.tolerance_per_m + SIGMAS * sigma_rad,
     })
 }
 

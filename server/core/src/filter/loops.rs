@@ -5,9 +5,7 @@
 //! registration there agrees or not. Only fits with the agreement of at least [`SUPPORT_MIN`]
 //! places over [`SUPPORT_PATH_M`] count as evidence: look-alikes rarely continue alike.
 
-use crate::edge::EdgeKind;
-use crate::edge::Proposal;
-use crate::edge::Vertex;
+use crate::edge::{EdgeKind, Proposal, Vertex};
 use crate::geometry::Pose2;
 use crate::graph::{Graph, Matched};
 use crate::scan::correlate::Source;
@@ -23,7 +21,7 @@ pub const SCORE_MIN: f64 = 0.75;
 const OVERLAP_MIN: f64 = 0.25;
 /// Fits less certain than this in some direction are free along it, as in a bare corridor, and lie
 /// anywhere there.
-const SIGMA_MAX_M: f64 = 0.12;
+const FIT_SIGMA_MAX_M: f64 = 0.12;
 /// Places that must agree before a loop counts …
 pub const SUPPORT_MIN: u32 = 3;
 /// … over so much path.
@@ -70,7 +68,6 @@ pub struct Fit {
 
 impl Fit {
     /// A fit that `support` places agree with, a metre apart.
-    #[cfg(test)]
     pub fn supported_by(i: Vertex, mode: Mode, kind: EdgeKind, support: u32) -> Self {
         let named = (kind == EdgeKind::Semantic).then_some((i, i + 20));
         Self { i, mode, kind, named, support, support_path_m: f64::from(support), age: 0 }
@@ -200,7 +197,7 @@ fn supported(graph: &Graph, t: Vertex, fits: Vec<Fit>, measured: &mut Measured) 
 }
 
 fn good(mode: &Mode) -> bool {
-    looks_alike(mode) && sigma_max_m(mode) <= SIGMA_MAX_M
+    looks_alike(mode) && sigma_max_m(mode) <= FIT_SIGMA_MAX_M
 }
 
 fn looks_alike(mode: &Mode) -> bool {
@@ -224,7 +221,9 @@ fn refusal(p: &Proposal, t: Vertex, found: &[Mode]) -> Option<Refusal> {
         Some(m) if m.overlap < OVERLAP_MIN => {
             format!("edge {t}–{} refused: overlap {:.2} < {OVERLAP_MIN}", p.i, m.overlap)
         }
-        Some(m) => format!("edge {t}–{} refused: free along {:.2} m > {SIGMA_MAX_M} m", p.i, sigma_max_m(m)),
+        Some(m) => {
+            format!("edge {t}–{} refused: free along {:.2} m > {FIT_SIGMA_MAX_M} m", p.i, sigma_max_m(m))
+        }
     };
     Some(Refusal { i: p.i, kind: p.kind, reason })
 }
@@ -362,10 +361,25 @@ fn distinct(graph: &Graph, mut fits: Vec<Fit>) -> Vec<Fit> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
-    use crate::filter::revisit::tests::straight;
+    use crate::scan::place::Content;
+    use crate::track::front::{Chain, FrozenPlace, OpenPlace};
     use nalgebra::Matrix3;
+
+    /// Places a metre apart along x.
+    pub(crate) fn straight(n: Vertex) -> Graph {
+        let mut graph = Graph::default();
+        for v in 0..n {
+            let previous_from_this = Pose2::new(1.0, 0.0, 0.0);
+            let chain = Chain { previous_from_this, information: Matrix3::identity(), broken: false };
+            let path_m = f64::from(v);
+            let front_from_place = Pose2::new(path_m, 0.0, 0.0);
+            let open = OpenPlace { id: v.into(), stamp_ns: 0, front_from_place, path_m, chain };
+            graph.add(FrozenPlace { open, content: Content::new(&[]) });
+        }
+        graph
+    }
 
     #[test]
     fn a_place_is_matched_with_few_others_and_with_those_that_words_name_first() {

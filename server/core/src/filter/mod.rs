@@ -16,29 +16,26 @@ pub(crate) mod second_look;
 pub mod weigh;
 
 use crate::config::Config;
-use crate::edge::EdgeKind;
-use crate::edge::Proposal;
-use crate::edge::Vertex;
+use crate::edge::{EdgeKind, Proposal, Vertex};
 use crate::effects::{Effect, Effects};
 use crate::filter::chance::log_looks;
 use crate::filter::decide::{Choice, add_edge, choose};
 use crate::filter::likelihood::weigh_overlaps;
-use crate::filter::loops::{Fit, Loops, Measured};
+use crate::filter::loops::{Fit, Loops, Measured, measure_again};
 use crate::filter::particle::Particle;
 use crate::filter::propose::propose;
 use crate::filter::resample::{effective_sample_size, is_wasteful, merge, normalise, resample};
 use crate::filter::revisit::{Revisits, Testimony};
+use crate::filter::second_look::SecondLooks;
 use crate::filter::weigh::{Judgement, judge};
 use crate::geometry::Pose2;
 use crate::graph::Graph;
-use crate::inject::inject;
 use crate::smoothing::{FactorId, SmoothError, Structure};
-use crate::talk::ledger::Ledger;
 use crate::track::front::{Chain, FrozenPlace};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Edges of a place that tell no particle anything new: they are measurements still, but who comes for the
@@ -52,8 +49,6 @@ pub struct Filter {
     pub config: Config,
     /// Places, chain, matches.
     pub graph: Graph,
-    /// What was said.
-    pub ledger: Arc<Ledger>,
     /// Factors of all particles together, and in what order they are eliminated.
     pub structure: Arc<Structure>,
     /// Distinct particles, best first; weights sum to one.
@@ -61,9 +56,8 @@ pub struct Filter {
     loops: Loops,
     revisits: Revisits,
     /// Factors that some particles hold and others don't.
-    pub(crate) disputed: Vec<FactorId>,
-    /// Places named anew since they were left, oldest first; see [`crate::filter::second_look`].
-    pub(crate) named_anew: VecDeque<Vertex>,
+    disputed: Vec<FactorId>,
+    second_looks: SecondLooks,
 }
 
 impl Filter {
@@ -73,27 +67,27 @@ impl Filter {
         Self {
             config,
             graph: Graph::default(),
-            ledger: Arc::default(),
             structure: Arc::default(),
             particles,
             loops: Loops::default(),
             revisits: Revisits::default(),
             disputed: Vec::new(),
-            named_anew: VecDeque::new(),
+            second_looks: SecondLooks::default(),
         }
     }
 
-    /// Algorithm 1 for a place just left.
-    pub fn step(&mut self, frozen: FrozenPlace) -> Effects {
+    /// Algorithm 1 for a place just left. What sentences say of it comes through [`crate::talk`]. A trial may
+    /// `spoil` what was measured, to see the filter survive it.
+    pub fn step(&mut self, frozen: FrozenPlace, spoil: &dyn Fn(Vertex, &mut Measured)) -> Effects {
         let chain = frozen.open.chain;
         let t = self.graph.add(frozen); // v_t
         self.extend(&chain); // its edge to v_{t-1}
         let proposals = if self.config.loops { self.propose(t) } else { Vec::new() }; // 1. edges e_tj, (5–9)
-        let measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
-        let mut effects = self.weigh_measured(t, measured); // 1, 2 and 4: G, X and w, (10), (17–18)
+        let mut measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
+        spoil(t, &mut measured);
+        let mut effects = self.weigh_measured(t, measured); // 1–4: G, X, L and w, (10), (17–18)
         effects.extend(self.look_again()); // the same for a place that was named since it was left
         weigh_overlaps(&self.graph, &self.structure, &mut self.particles, t); // 4. w where nothing fitted, (18)
-        self.reground(); // 3. L: edges carry labels over; descriptions are grounded in the map as it is now
         normalise(&mut self.particles);
         self.particles = merge(std::mem::take(&mut self.particles));
         let size = effective_sample_size(&self.particles);
@@ -126,6 +120,71 @@ impl Filter {
     pub fn restore(&mut self) -> Result<(), SmoothError> {
         let structure = &self.structure;
         self.particles.par_iter_mut().try_for_each(|p| p.belief.restore(structure))
+    }
+
+    /// All that is left to do when no more comes: what waits for a second look gets it.
+    pub fn finish(&mut self) -> Effects {
+        let mut effects = Effects::new();
+        while let Some(v) = self.second_looks.next() {
+            effects.extend(self.look_again_from(v));
+        }
+        self.rank();
+        effects
+    }
+
+    /// Weights that sum to one, the best particle first.
+    pub fn rank(&mut self) {
+        normalise(&mut self.particles);
+        self.particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    }
+
+    /// Places whose names have changed wait for a second look. One not left yet needs none: its first is
+    /// to come. The paper gives none.
+    pub fn named_anew(&mut self, places: impl IntoIterator<Item = Vertex>) {
+        if !self.config.rules.by_paper() {
+            let left = self.graph.places().len() as Vertex;
+            self.second_looks.wait(places.into_iter().filter(|&v| v < left));
+        }
+    }
+
+    /// Pairs whose names led to revisits, and still would.
+    pub fn led_by_names(&self) -> BTreeSet<(Vertex, Vertex)> {
+        second_look::led_by_names(&self.particles)
+    }
+
+    /// Judges again the revisits, of those that names led to, whose names were taken back. Returns how many
+    /// revisits some particle gave up.
+    pub fn judge_again(&mut self, led: BTreeSet<(Vertex, Vertex)>) -> usize {
+        let Self { particles, graph, structure, .. } = self;
+        let given_up = second_look::judge_again(particles, graph, structure, self.config.gamma_per_m2, led);
+        self.disputed.extend(given_up.disputed);
+        self.disputed.sort_unstable();
+        self.disputed.dedup();
+        self.forget();
+        given_up.revisits
+    }
+
+    /// Puts an edge into the graph of every particle, whatever speaks against it: a trial, see
+    /// [`crate::trial`].
+    pub fn impose(&mut self, t: Vertex, fit: &Fit) {
+        let revisit = self.revisits.see(&self.graph, fit, t, 0.0).revisit;
+        let Some(edge) = add_edge(Arc::make_mut(&mut self.structure), fit, revisit, t) else { return };
+        self.particles.iter_mut().for_each(|p| p.take(edge.clone()));
+        self.update();
+    }
+
+    /// Looks at the pairs that the names of one place that waits propose by now.
+    fn look_again(&mut self) -> Effects {
+        self.second_looks.next().map_or_else(Effects::new, |v| self.look_again_from(v))
+    }
+
+    fn look_again_from(&mut self, v: Vertex) -> Effects {
+        let mut effects = Effects::new();
+        for (t, proposal) in second_look::pairs(&self.config, &self.graph, &self.particles, v) {
+            let measured = measure_again(&mut self.graph, t, &[proposal]);
+            effects.extend(self.weigh_measured(t, measured));
+        }
+        effects
     }
 
     fn extend(&mut self, chain: &Chain) {
@@ -169,8 +228,7 @@ impl Filter {
     }
 
     /// All that was measured at place t.
-    pub(crate) fn weigh_measured(&mut self, t: Vertex, mut measured: Measured) -> Effects {
-        inject(&self.config, t, &mut measured.fits);
+    fn weigh_measured(&mut self, t: Vertex, measured: Measured) -> Effects {
         let mut effects = refusals(t, &measured);
         let (fits, mut known) = (measured.fits.len(), 0);
         for fit in &measured.fits {
@@ -225,7 +283,7 @@ impl Filter {
     }
 
     /// Takes out the factors that no particle holds any more.
-    pub(crate) fn forget(&mut self) {
+    fn forget(&mut self) {
         let (structure, particles) = (&mut self.structure, &self.particles);
         self.disputed.retain(|&factor| {
             let holders = particles.iter().filter(|p| p.belief.holds(factor)).count();
@@ -274,92 +332,4 @@ fn refusals(t: Vertex, measured: &Measured) -> Effects {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::edge::EdgeKind;
-    use crate::scan::matching::Mode;
-    use crate::scan::place::Content;
-    use crate::track::front::OpenPlace;
-    use nalgebra::Vector3;
-
-    /// A straight chain of places 1 m apart whose ends fit so that half of the posterior believes it.
-    fn split() -> Filter {
-        let mut filter = Filter::new(Config::default());
-        for _ in 0..21 {
-            filter.extend(&chain());
-        }
-        let fits = vec![fit(0, 17.7, EdgeKind::Distance)];
-        filter.weigh_measured(20, Measured { fits, refused: vec![] });
-        filter
-    }
-
-    #[test]
-    fn of_what_all_know_two_edges_a_place_are_enough() {
-        let mut filter = Filter::new(Config { loops: false, ..Config::default() });
-        for v in 0_u32..21 {
-            let front_from_place = Pose2::new(f64::from(v), 0.0, 0.0);
-            let (id, path_m, chain) = (v.into(), f64::from(v), chain());
-            let open = OpenPlace { id, stamp_ns: 0, front_from_place, path_m, chain };
-            filter.step(FrozenPlace { open, content: Content::new(&[]) });
-        }
-        let mut fits: Vec<Fit> = (16..20).map(|i| fit(i, f64::from(20 - i), EdgeKind::Distance)).collect();
-        fits.push(fit(15, 5.0, EdgeKind::Semantic));
-        fits.push(fit(0, 20.0, EdgeKind::Distance));
-        let effects = filter.weigh_measured(20, Measured { fits, refused: vec![] });
-        let taken = |e: &&Effect| matches!(e, Effect::EdgeAccepted { .. });
-        assert_eq!((effects.len(), effects.iter().filter(taken).count()), (6, 4));
-        let older = |p: &Particle| -> Vec<Vertex> { p.edges.iter().map(|e| e.i).collect() };
-        assert_eq!(older(filter.best()), [16, 17, 15], "words are said once");
-        assert!(filter.particles.iter().any(|p| older(p) == [16, 17, 15, 0]), "news is news");
-    }
-
-    fn fit(i: Vertex, x_m: f64, kind: EdgeKind) -> Fit {
-        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
-        let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score: 0.9, overlap: 0.6 };
-        Fit::supported_by(i, mode, kind, 3)
-    }
-
-    fn chain() -> Chain {
-        let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
-        Chain { previous_from_this: Pose2::new(1.0, 0.0, 0.0), information, broken: false }
-    }
-
-    fn length_m(filter: &Filter) -> f64 {
-        filter.best().belief.pose(20).x_m
-    }
-
-    #[test]
-    fn a_fit_splits_a_particle_into_one_with_the_edge_and_one_without() {
-        let filter = split();
-        let [a, b] = &filter.particles[..] else { panic!("{}", filter.particles.len()) };
-        let (with, without) = if a.edges.is_empty() { (b, a) } else { (a, b) };
-        assert_eq!((with.edges.len(), without.edges.len(), with.count + without.count), (1, 0, 30));
-        assert!((with.belief.pose(20).x_m - 17.7).abs() < 0.05);
-        assert!((without.belief.pose(20).x_m - 20.0).abs() < 1e-9);
-        assert_eq!(filter.disputed, [with.edges[0].factor]);
-    }
-
-    #[test]
-    fn a_factor_that_no_particle_holds_any_more_is_taken_out() {
-        let mut filter = split();
-        let factor = filter.disputed[0];
-        filter.forget();
-        assert!(filter.structure.factor(factor).is_some() && filter.disputed == [factor]);
-        filter.particles.retain(|p| p.edges.is_empty());
-        filter.forget();
-        assert!(filter.structure.factor(factor).is_none() && filter.disputed.is_empty());
-        filter.extend(&chain());
-        assert!((length_m(&filter) - 20.0).abs() < 1e-9);
-    }
-
-    #[test]
-    fn a_factor_that_all_particles_hold_stays() {
-        let mut filter = split();
-        let factor = filter.disputed[0];
-        filter.particles.retain(|p| !p.edges.is_empty());
-        filter.forget();
-        assert!(filter.structure.factor(factor).is_some() && filter.disputed.is_empty());
-        filter.extend(&chain());
-        assert!((length_m(&filter) - 17.7).abs() < 0.05);
-    }
-}
+mod tests;

@@ -1,8 +1,6 @@
 //! A particle: {G, X, L, w} of eq. (4). Equal particles are one, with a count.
 
-use crate::edge::EdgeKind;
-use crate::edge::RevisitId;
-use crate::edge::Vertex;
+use crate::edge::{EdgeKind, RevisitId, Vertex};
 use crate::filter::labels::Labels;
 use crate::geometry::Pose2;
 use crate::smoothing::{Belief, FactorId, SmoothError, Structure};

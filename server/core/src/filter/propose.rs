@@ -5,8 +5,7 @@
 //! is decided in [`crate::filter::weigh`], where the proposal's probability is accounted for.
 
 use crate::config::Config;
-use crate::edge::Vertex;
-use crate::edge::{EdgeKind, Proposal};
+use crate::edge::{EdgeKind, Proposal, Vertex};
 use crate::filter::particle::Particle;
 use crate::graph::Graph;
 use crate::random::{Purpose, uniform};
@@ -17,7 +16,7 @@ use std::collections::BTreeMap;
 /// Older places looked at per new place and particle.
 const LOOKED_AT_MAX: usize = 5;
 /// Places proposed are so far apart along the path: their content overlaps otherwise.
-const SPREAD_M: f64 = 2.0;
+pub(crate) const SPREAD_M: f64 = 2.0;
 /// Beyond, two places' scans hardly overlap, and eq. (6) is small.
 pub const NEAR_M: f64 = 10.0;
 /// Position uncertainty at which the robot counts as lost.

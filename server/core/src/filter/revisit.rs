@@ -76,27 +76,12 @@ impl Revisit {
 }
 
 #[cfg(test)]
-pub(crate) mod tests {
+mod tests {
     use super::*;
     use crate::edge::EdgeKind;
+    use crate::filter::loops::tests::straight;
     use crate::scan::matching::Mode;
-    use crate::scan::place::Content;
-    use crate::track::front::{Chain, FrozenPlace, OpenPlace};
     use nalgebra::Matrix3;
-
-    /// Places a metre apart along x.
-    pub(crate) fn straight(n: Vertex) -> Graph {
-        let mut graph = Graph::default();
-        for v in 0..n {
-            let previous_from_this = Pose2::new(1.0, 0.0, 0.0);
-            let chain = Chain { previous_from_this, information: Matrix3::identity(), broken: false };
-            let path_m = f64::from(v);
-            let front_from_place = Pose2::new(path_m, 0.0, 0.0);
-            let open = OpenPlace { id: v.into(), stamp_ns: 0, front_from_place, path_m, chain };
-            graph.add(FrozenPlace { open, content: Content::new(&[]) });
-        }
-        graph
-    }
 
     /// A fit with place `i`, seen `x_m` from there.
     fn fit(i: Vertex, x_m: f64) -> Fit {

@@ -1,20 +1,18 @@
 //! Steps 1 and 4 once more, for places that the robot left long ago: where names came late, they may
 //! still propose edges; where names were taken back, the revisits that they had led to are judged again.
 
-use crate::config::Rules;
-use crate::edge::EdgeKind;
-use crate::edge::Proposal;
-use crate::edge::Vertex;
-use crate::effects::Effects;
-use crate::filter::Filter;
+use crate::config::Config;
+use crate::edge::{EdgeKind, Proposal, Vertex};
 use crate::filter::chance::log_looks;
 use crate::filter::labels::Evidence;
 use crate::filter::loops::{Fit, measure_again};
 use crate::filter::particle::Particle;
 use crate::filter::propose::{SIMILARITY_MIN, propose_named};
 use crate::filter::weigh::judge_alone;
-use crate::smoothing::Structure;
+use crate::graph::Graph;
+use crate::smoothing::{FactorId, Structure};
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Places named anew that wait for their turn; the oldest give way.
@@ -24,96 +22,93 @@ const NAMED_MIN: f64 = 0.1;
 /// Pairs of a place looked at again.
 const PAIRS_MAX: usize = 2;
 
-impl Filter {
-    /// Places whose names have changed wait for a second look. One not left yet needs none: its first is
-    /// to come. The paper gives none.
-    pub(crate) fn named_anew(&mut self, places: impl IntoIterator<Item = Vertex>) {
-        if self.config.rules == Rules::Paper {
-            return;
-        }
-        let left = self.graph.places().len() as Vertex;
-        wait(&mut self.named_anew, places.into_iter().filter(|&v| v < left));
+/// Places named anew since they were left, oldest first.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct SecondLooks {
+    waiting: VecDeque<Vertex>,
+}
+
+impl SecondLooks {
+    /// These wait for a second look.
+    pub fn wait(&mut self, places: impl IntoIterator<Item = Vertex>) {
+        wait(&mut self.waiting, places.into_iter());
     }
 
-    /// All that is left to do when no more comes: descriptions are grounded in the whole map, and what
-    /// waits for a second look gets it.
-    pub fn finish(&mut self) -> Effects {
-        self.reground_all();
-        let mut effects = Effects::new();
-        while !self.named_anew.is_empty() {
-            effects.extend(self.look_again());
-        }
-        self.rank();
-        effects
+    /// The next one whose turn it is.
+    pub fn next(&mut self) -> Option<Vertex> {
+        self.waiting.pop_front()
     }
+}
 
-    /// Looks at the pairs that the names of one place that waits propose by now.
-    pub(crate) fn look_again(&mut self) -> Effects {
-        let Some(v) = self.named_anew.pop_front() else { return Effects::new() };
-        let mut likeliest: BTreeMap<Vertex, f64> = BTreeMap::new();
-        let (config, graph) = (&self.config, &self.graph);
-        let drawn = |p: &Particle| propose_named(config, graph, p, v);
-        for Proposal { i, probability, .. } in self.particles.iter().flat_map(drawn) {
-            let known = likeliest.entry(i).or_insert(probability);
-            *known = known.max(probability);
-        }
-        let mut pairs: Vec<(Vertex, f64)> =
-            likeliest.into_iter().filter(|(i, _)| !self.tied(*i, v)).collect();
-        pairs.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let mut effects = Effects::new();
-        for &(u, probability) in pairs.iter().take(PAIRS_MAX) {
-            let (i, t) = (u.min(v), u.max(v));
-            let proposal = Proposal { i, kind: EdgeKind::Semantic, probability };
-            let measured = measure_again(&mut self.graph, t, &[proposal]);
-            effects.extend(self.weigh_measured(t, measured));
-        }
-        effects
+/// The pairs that the names of a place propose by now and nobody has an edge of, likeliest first: the
+/// newer place of each, and what to look at from there.
+pub fn pairs(config: &Config, graph: &Graph, particles: &[Particle], v: Vertex) -> Vec<(Vertex, Proposal)> {
+    let mut likeliest: BTreeMap<Vertex, f64> = BTreeMap::new();
+    let drawn = |p: &Particle| propose_named(config, graph, p, v);
+    for Proposal { i, probability, .. } in particles.iter().flat_map(drawn) {
+        let known = likeliest.entry(i).or_insert(probability);
+        *known = known.max(probability);
     }
+    let mut pairs: Vec<(Vertex, f64)> =
+        likeliest.into_iter().filter(|(i, _)| !tied(particles, *i, v)).collect();
+    pairs.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let proposal = |(u, probability): (Vertex, f64)| {
+        (u.max(v), Proposal { i: u.min(v), kind: EdgeKind::Semantic, probability })
+    };
+    pairs.into_iter().take(PAIRS_MAX).map(proposal).collect()
+}
 
-    /// Whether some particle has an edge between two places: whoever has none has refused it.
-    fn tied(&self, a: Vertex, b: Vertex) -> bool {
-        let pair = (a.min(b), a.max(b));
-        self.particles.iter().any(|p| p.edges.iter().any(|e| (e.i, e.j) == pair))
-    }
+/// Whether some particle has an edge between two places: whoever has none has refused it.
+fn tied(particles: &[Particle], a: Vertex, b: Vertex) -> bool {
+    let pair = (a.min(b), a.max(b));
+    particles.iter().any(|p| p.edges.iter().any(|e| (e.i, e.j) == pair))
+}
 
-    /// Pairs whose names led to revisits, and still would.
-    pub(crate) fn led_by_names(&self) -> BTreeSet<(Vertex, Vertex)> {
-        let of = |p: &Particle| -> BTreeSet<(Vertex, Vertex)> {
-            p.edges.iter().filter_map(|e| e.named).filter(|&pair| !unnamed(p, pair)).collect()
+/// Pairs whose names led to revisits, and still would.
+pub fn led_by_names(particles: &[Particle]) -> BTreeSet<(Vertex, Vertex)> {
+    let of = |p: &Particle| -> BTreeSet<(Vertex, Vertex)> {
+        p.edges.iter().filter_map(|e| e.named).filter(|&pair| !unnamed(p, pair)).collect()
+    };
+    particles.iter().flat_map(of).collect()
+}
+
+/// What judging again has changed.
+pub struct GivenUp {
+    /// Revisits that some particle gave up.
+    pub revisits: usize,
+    /// Factors that not all particles hold any more.
+    pub disputed: Vec<FactorId>,
+}
+
+/// Judges again the revisits, of those that names led to, whose names were taken back: who would not have
+/// taken the edge for the distance alone gives up all edges of the revisit. Weights stay: what the scans
+/// said they still say.
+pub fn judge_again(
+    particles: &mut [Particle],
+    graph: &mut Graph,
+    structure: &Structure,
+    gamma_per_m2: f64,
+    led: BTreeSet<(Vertex, Vertex)>,
+) -> GivenUp {
+    let doubt = |pair: &(Vertex, Vertex)| particles.iter().any(|p| unnamed(p, *pair));
+    let doubted: Vec<(Vertex, Vertex)> = led.into_iter().filter(doubt).collect();
+    let mut given_up = GivenUp { revisits: 0, disputed: Vec::new() };
+    for pair in doubted {
+        let proposal = Proposal { i: pair.0, kind: EdgeKind::Distance, probability: 0.0 };
+        let fits = measure_again(graph, pair.1, &[proposal]).fits;
+        let again = |p: &Particle| {
+            if unnamed(p, pair) { without(p, structure, pair, &fits, gamma_per_m2) } else { None }
         };
-        self.particles.iter().flat_map(of).collect()
-    }
-
-    /// Judges again the revisits, of those that names led to, whose names were taken back: who would not
-    /// have taken the edge for the distance alone gives up all edges of the revisit. Returns how many
-    /// revisits some particle gave up. Weights stay: what the scans said they still say.
-    pub(crate) fn judge_again(&mut self, led: BTreeSet<(Vertex, Vertex)>) -> usize {
-        let doubt = |pair: &(Vertex, Vertex)| self.particles.iter().any(|p| unnamed(p, *pair));
-        let doubted: Vec<(Vertex, Vertex)> = led.into_iter().filter(doubt).collect();
-        let mut given_up = 0;
-        for pair in doubted {
-            let kind = EdgeKind::Distance;
-            let fits =
-                measure_again(&mut self.graph, pair.1, &[Proposal { i: pair.0, kind, probability: 0.0 }])
-                    .fits;
-            let (structure, gamma_per_m2) = (&self.structure, self.config.gamma_per_m2);
-            let again = |p: &Particle| {
-                if unnamed(p, pair) { without(p, structure, pair, &fits, gamma_per_m2) } else { None }
-            };
-            let again: Vec<Option<Particle>> = self.particles.par_iter().map(again).collect();
-            given_up += usize::from(again.iter().any(Option::is_some));
-            for (p, again) in self.particles.iter_mut().zip(again) {
-                let Some(again) = again else { continue };
-                let kept: BTreeSet<_> = again.edges.iter().map(|e| e.factor).collect();
-                self.disputed.extend(p.edges.iter().map(|e| e.factor).filter(|f| !kept.contains(f)));
-                *p = again;
-            }
+        let again: Vec<Option<Particle>> = particles.par_iter().map(again).collect();
+        given_up.revisits += usize::from(again.iter().any(Option::is_some));
+        for (p, again) in particles.iter_mut().zip(again) {
+            let Some(again) = again else { continue };
+            let kept: BTreeSet<_> = again.edges.iter().map(|e| e.factor).collect();
+            given_up.disputed.extend(p.edges.iter().map(|e| e.factor).filter(|f| !kept.contains(f)));
+            *p = again;
         }
-        self.disputed.sort_unstable();
-        self.disputed.dedup();
-        self.forget();
-        given_up
     }
+    given_up
 }
 
 /// Each waits once, and not too many.
@@ -154,7 +149,7 @@ fn without(
 }
 
 /// The places at which an utterance says more of a name than before.
-pub(crate) fn gained(before: &[Evidence], after: &[Evidence]) -> Vec<Vertex> {
+pub fn gained(before: &[Evidence], after: &[Evidence]) -> Vec<Vertex> {
     let was = |e: &Evidence| {
         before.iter().filter(|b| (b.place, b.label) == (e.place, e.label)).map(|b| b.weight).sum::<f64>()
     };

@@ -13,8 +13,7 @@
 //! proposal cancels, and z is counted once), once for all fits of a revisit ([`crate::filter::decide`]). The
 //! poses x⁻ are those before z.
 
-use crate::edge::EdgeKind;
-use crate::edge::Vertex;
+use crate::edge::{EdgeKind, Vertex};
 use crate::filter::loops::{AGREE_M, AGREE_RAD, Fit, agree};
 use crate::filter::particle::Particle;
 use crate::filter::propose::{LOST_SIGMA_M, RELOCALISATION_P, distance_probability};
@@ -123,11 +122,32 @@ fn edge_prior(particle: &Particle, fit: &Fit, t: Vertex, predicted: &Relative, g
 }
 
 #[cfg(test)]
-mod tests {
+pub(crate) mod tests {
     use super::*;
     use crate::filter::chance::log_looks;
-    use crate::filter::decide::tests::{chain, fit};
+    use crate::geometry::Pose2;
+    use crate::scan::matching::Mode;
+    use nalgebra::{Matrix3, Vector3};
     use std::sync::Arc;
+
+    /// A chain of n places 1 m apart, straight on, that has drifted by `sigma_m` per place.
+    pub(crate) fn chain(n: u32, sigma_m: f64) -> (Structure, Particle) {
+        let (mut structure, mut p) = (Structure::new(), Particle::empty(10));
+        let covariance = Matrix3::from_diagonal(&Vector3::new(sigma_m.powi(2), sigma_m.powi(2), 1e-6));
+        let information = covariance.try_inverse().unwrap();
+        for _ in 0..n {
+            structure.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
+        }
+        structure.arrange();
+        p.update(&structure).unwrap();
+        (structure, p)
+    }
+
+    pub(crate) fn fit(x_m: f64, score: f64, support: u32) -> Fit {
+        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
+        let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score, overlap: 0.6 };
+        Fit::supported_by(0, mode, EdgeKind::Distance, support)
+    }
 
     /// What a particle thinks of one of `fits` fits of the last of 21 places.
     fn alone(structure: &Structure, p: &Particle, fit: &Fit, fits: usize) -> Judgement {
@@ -144,13 +164,36 @@ mod tests {
     }
 
     #[test]
-    fn evidence_is_the_marginal_over_both_outcomes() {
-        let (structure, p) = chain(21, 0.1);
-        let j = alone(&structure, &p, &fit(20.4, 0.9, 3), 1);
-        // p(z) p(e=0|z) = p(e=0) p(z|e=0).
-        let refused = j.log_evidence + (1.0 - j.posterior).ln();
-        let far = alone(&structure, &p, &fit(-40.0, 0.9, 3), 1);
-        assert!((refused - far.log_evidence).abs() < 1e-6, "{refused} {far:?}");
+    fn evidence_is_the_sum_over_both_outcomes_written_out() {
+        let (sigma_m, x_m) = (0.1, 20.4);
+        let (structure, p) = chain(21, sigma_m);
+        let f = fit(x_m, 0.9, 3);
+        let j = alone(&structure, &p, &f, 1);
+        // Twenty steps along x from place 0, of which each turns by 1 mrad: what is left of the chain's
+        // lateral spread and of its heading by hand, then S, N(z; h, S) and both outcomes.
+        let steps = 20.0;
+        let along = steps * sigma_m * sigma_m + 4e-4;
+        let lever: f64 = (0..20).map(|k| f64::from(k).powi(2)).sum();
+        let (across, turn) = (steps * sigma_m * sigma_m + lever * 1e-6 + 4e-4, steps * 1e-6 + 1.6e-5);
+        let cross: f64 = (0..20).map(f64::from).sum::<f64>() * 1e-6;
+        let determinant = along * (across * turn - cross * cross);
+        let off = x_m - steps;
+        let log_n = -0.5 * (off * off / along + (TAU.powi(3) * determinant).ln());
+        let looks = log_looks(&f, 1);
+        let d_m = |s: f64| steps + s * along.sqrt();
+        let kernel = |s: f64| (-0.5 * s * s).exp();
+        let (mut sum, mut mass) = (0.0, 0.0);
+        for k in -3000..=3000 {
+            let s = f64::from(k) * 1e-3;
+            sum += kernel(s) / (1.0 + 0.2 * d_m(s).powi(2));
+            mass += kernel(s);
+        }
+        let prior = sum / mass;
+        let window = (2.0 * WINDOW_M).powi(2) * TAU;
+        let taken = prior * ((log_n + window.ln()) * DENSITY_POWER + looks).exp();
+        let expected = (taken + 1.0 - prior).ln();
+        assert!((j.log_evidence - expected).abs() < 0.02, "{} {expected}", j.log_evidence);
+        assert!((j.posterior - taken / (taken + 1.0 - prior)).abs() < 0.02);
     }
 
     #[test]

@@ -1,6 +1,9 @@
 //! What sentences say, as a whole. `golden.jsonl` is a table of our own sentences; the example `parse`
 //! scores such tables.
 
+mod reference;
+mod words;
+
 use super::*;
 use crate::language::act::{Content, Head, Locate};
 use proptest::prelude::*;

@@ -1,11 +1,12 @@
 //! Two places' scans to modes: the measurement z behind every loop edge.
 
 use crate::geometry::Pose2;
-use crate::scan::agree::{Look, agreement};
+use crate::scan::agree::agreement;
 use crate::scan::align::{align, sound_information};
 use crate::scan::cloud::{Index, Point};
 use crate::scan::correlate::{Raster, Source, search};
 use crate::scan::place::Content;
+use crate::scan::view::Closeness;
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
@@ -71,7 +72,7 @@ fn polish(i: &Content, index: &Index, j: &Content, coarse: &Pose2) -> Option<Mod
     let per_sample = j.sample.len() as f64 / some.len().max(1) as f64;
     let information = sound_information(&some, index, &found, GATE_M / 8.0);
     let covariance = (information * per_sample + weak).try_inverse()? + floor;
-    let agreement = agreement(i, j, &found.target_from_source, &Look::CLOSE);
+    let agreement = agreement(i, j, &found.target_from_source, &Closeness::CLOSE);
     Some(Mode {
         i_from_j: found.target_from_source,
         covariance: (covariance + covariance.transpose()) * 0.5,
@@ -83,7 +84,7 @@ fn polish(i: &Content, index: &Index, j: &Content, coarse: &Pose2) -> Option<Mod
 /// Whether a rough look at a transform, far cheaper than registration, leaves it open that the places
 /// fit nearby.
 pub fn plausible(i: &Content, j: &Content, guess: &Pose2) -> bool {
-    let rough = agreement(i, j, guess, &Look::ROUGH);
+    let rough = agreement(i, j, guess, &Closeness::ROUGH);
     rough.score() >= ROUGH_SCORE_MIN && rough.overlap() >= ROUGH_OVERLAP_MIN
 }
 
@@ -120,7 +121,7 @@ fn registered(i: &Content, index: &Index, j: &Content, guesses: &[Pose2]) -> Vec
     let mut registered: Vec<(f64, Pose2)> = Vec::new();
     for guess in guesses {
         let Some(found) = align(&few, index, guess, None, GATE_M) else { continue };
-        let brief = agreement(i, j, &found.target_from_source, &Look::BRIEF);
+        let brief = agreement(i, j, &found.target_from_source, &Closeness::BRIEF);
         if brief.score() >= BRIEF_SCORE_MIN && brief.overlap() >= BRIEF_OVERLAP_MIN {
             registered.push((brief.worth(), found.target_from_source));
         }

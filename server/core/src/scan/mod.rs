@@ -21,4 +21,5 @@ pub mod place;
 #[cfg(test)]
 pub mod rooms;
 pub mod sweep;
+pub mod view;
 mod weak;

@@ -2,9 +2,9 @@
 //! has left it.
 
 use crate::geometry::Pose2;
-use crate::scan::agree::{Look, votes};
 use crate::scan::cloud::{Point, moved, thin};
-use crate::scan::sweep::{RangeImage, Sweep};
+use crate::scan::sweep::Sweep;
+use crate::scan::view::{Closeness, View, votes};
 use serde::{Deserialize, Serialize};
 
 /// Thinning of a place's cloud.
@@ -23,15 +23,6 @@ pub struct Content {
     pub sample: Vec<Point>,
 }
 
-/// One of a place's range images.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct View {
-    /// The laser in the place's frame.
-    pub place_from_laser: Pose2,
-    /// What it saw.
-    pub image: RangeImage,
-}
-
 impl Content {
     /// From sweeps with their poses in the place's frame.
     pub fn new(sweeps: &[(Pose2, &Sweep)]) -> Self {
@@ -47,7 +38,7 @@ impl Content {
             })
             .collect();
         // What most of the place's own scans saw through was somebody's legs, or a door being opened.
-        let mut votes = votes(&cloud, &views, &Pose2::default(), &Look::CLOSE).into_iter();
+        let mut votes = votes(&cloud, &views, &Pose2::default(), &Closeness::CLOSE).into_iter();
         cloud.retain(|_| votes.next() >= Some(0));
         let sample = spread(&cloud, 300);
         Self { cloud, views, sample }

@@ -1,7 +1,6 @@
 //! Step 3 of Algorithm 1, descriptions: where each particle puts what a sentence locates, eqs.
 //! (13–16), when it is said and again as the map grows: what was not there yet may be by now.
 
-use crate::config::Rules;
 use crate::edge::Vertex;
 use crate::filter::Filter;
 use crate::filter::labels::{Evidence, LabelId, Labels, Source};
@@ -15,6 +14,7 @@ use crate::language::{
 };
 use crate::talk::ledger::Ledger;
 use crate::talk::predictive::log_located;
+use crate::talk::{Here, Talk};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -26,93 +26,85 @@ const AGAIN_PER_PLACE: usize = 1;
 /// "This hallway" and "the nearest exit" are about so near.
 const THIS_M: f64 = 10.0;
 
-impl Filter {
-    /// Grounds what a sentence locates in every particle, anew if it was before. `poses` of a
-    /// particle's places, with the path travelled up to each. Returns what the sentence says for or
-    /// against each particle, if it locates anything.
-    pub(crate) fn ground(
-        &mut self,
-        utterance: u32,
-        parse: &Parse,
-        held: Vertex,
-        poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
-        path_m: &[f64],
-    ) -> Vec<f64> {
-        let figures: Vec<_> = located(parse).iter().filter_map(|(_, l)| l.figure.label()).collect();
-        if figures.is_empty() {
-            return Vec::new();
-        }
-        let ledger = Arc::make_mut(&mut self.ledger);
-        for name in &figures {
-            ledger.enter_name(name);
-        }
-        let (ledger, by_paper) = (&self.ledger, self.config.rules == Rules::Paper);
-        let ground = |p: &mut Particle| {
-            let scene = Scene {
-                places: places(&poses(p), path_m),
-                labels: &p.labels,
-                ledger,
-                utterance,
-                held: held as usize,
-                by_paper,
-            };
-            let (grounded, log_ratio) = scene.grounded(parse);
-            (gained(&p.labels.reground(utterance, &grounded), &grounded), log_ratio)
+/// Grounds what a sentence locates in every particle, anew if it was before. `poses` of a particle's
+/// places, with the path travelled up to each. Returns what the sentence says for or against each
+/// particle, if it locates anything.
+pub(crate) fn ground(
+    talk: &mut Talk,
+    filter: &mut Filter,
+    (utterance, parse, held): (u32, &Parse, Vertex),
+    poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
+    path_m: &[f64],
+) -> Vec<f64> {
+    let figures: Vec<_> = located(parse).iter().filter_map(|(_, l)| l.figure.label()).collect();
+    if figures.is_empty() {
+        return Vec::new();
+    }
+    let ledger = Arc::make_mut(&mut talk.ledger);
+    for name in &figures {
+        ledger.enter_name(name);
+    }
+    let (ledger, by_paper) = (&talk.ledger, filter.config.rules.by_paper());
+    let ground = |p: &mut Particle| {
+        let scene = Scene {
+            places: places(&poses(p), path_m),
+            labels: &p.labels,
+            ledger,
+            utterance,
+            held: held as usize,
+            by_paper,
         };
-        let (gained, log_ratios): (Vec<Vec<Vertex>>, Vec<f64>) =
-            self.particles.par_iter_mut().map(ground).unzip();
-        self.named_anew(gained.into_iter().flatten().collect::<BTreeSet<_>>());
-        log_ratios
-    }
+        let (grounded, log_ratio) = scene.grounded(parse);
+        (gained(&p.labels.reground(utterance, &grounded), &grounded), log_ratio)
+    };
+    let (gained, log_ratios): (Vec<Vec<Vertex>>, Vec<f64>) =
+        filter.particles.par_iter_mut().map(ground).unzip();
+    filter.named_anew(gained.into_iter().flatten().collect::<BTreeSet<_>>());
+    log_ratios
+}
 
-    /// Grounds some descriptions again, one after the other in turn, in the map as it is now.
-    pub(crate) fn reground(&mut self) {
-        let (turn, all) = (self.graph.places().len(), self.ledger.descriptions().len());
-        let due = (0..AGAIN_PER_PLACE.min(all)).map(|k| (turn * AGAIN_PER_PLACE + k) % all);
-        let due: Vec<u32> = due.filter_map(|k| self.ledger.descriptions().nth(k)).collect();
-        self.reground_some(&due);
-    }
+/// Grounds some descriptions again, one after the other in turn, in the map as it is now.
+pub(crate) fn reground(talk: &mut Talk, filter: &mut Filter) {
+    let (turn, all) = (filter.graph.places().len(), talk.ledger.descriptions().len());
+    let due = (0..AGAIN_PER_PLACE.min(all)).map(|k| (turn * AGAIN_PER_PLACE + k) % all);
+    let due: Vec<u32> = due.filter_map(|k| talk.ledger.descriptions().nth(k)).collect();
+    reground_some(talk, filter, &due);
+}
 
-    /// Grounds all descriptions again.
-    pub fn reground_all(&mut self) {
-        let all: Vec<u32> = self.ledger.descriptions().collect();
-        self.reground_some(&all);
-    }
+/// Grounds all descriptions again.
+pub(crate) fn reground_all(talk: &mut Talk, filter: &mut Filter) {
+    let all: Vec<u32> = talk.ledger.descriptions().collect();
+    reground_some(talk, filter, &all);
+}
 
-    fn reground_some(&mut self, utterances: &[u32]) {
-        if self.config.rules == Rules::Paper {
-            return;
-        }
-        let path_m: Vec<f64> = self.graph.places().iter().map(|p| p.path_m).collect();
-        for &utterance in utterances {
-            let entry = &self.ledger.entries()[utterance as usize];
-            // Said at a place that is not in the graph yet: its time will come.
-            if (entry.held as usize) < path_m.len() {
-                let (parse, held) = (entry.parse.clone(), entry.held);
-                self.ground(utterance, &parse, held, &|p| p.belief.poses(), &path_m);
-            }
+fn reground_some(talk: &mut Talk, filter: &mut Filter, utterances: &[u32]) {
+    if filter.config.rules.by_paper() {
+        return;
+    }
+    let path_m: Vec<f64> = filter.graph.places().iter().map(|p| p.path_m).collect();
+    for &utterance in utterances {
+        let entry = &talk.ledger.entries()[utterance as usize];
+        // Said at a place that is not in the graph yet: its time will come.
+        if (entry.held as usize) < path_m.len() {
+            let (parse, held) = (entry.parse.clone(), entry.held);
+            ground(talk, filter, (utterance, &parse, held), &|p| p.belief.poses(), &path_m);
         }
     }
+}
 
-    /// Grounds again the descriptions that speak of a name, as something new was said of it.
-    pub(crate) fn reground_about(
-        &mut self,
-        label: LabelId,
-        poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
-        path_m: &[f64],
-    ) {
-        if self.config.rules == Rules::Paper {
-            return;
-        }
-        let speaks =
-            |p: &Phrase| p.label().is_some_and(|name| self.ledger.label(name.as_str()) == Some(label));
-        let about = |l: &Locate| speaks(&l.figure) || l.landmarks.iter().any(speaks);
-        let of = |u: &u32| &self.ledger.entries()[*u as usize];
-        let due = self.ledger.descriptions().filter(|u| located(&of(u).parse).iter().any(|(_, l)| about(l)));
-        let due: Vec<(u32, Parse, Vertex)> = due.map(|u| (u, of(&u).parse.clone(), of(&u).held)).collect();
-        for (utterance, parse, held) in due {
-            self.ground(utterance, &parse, held, poses, path_m);
-        }
+/// Grounds again the descriptions that speak of a name, as something new was said of it.
+pub(crate) fn reground_about(talk: &mut Talk, filter: &mut Filter, label: LabelId, here: &Here) {
+    if filter.config.rules.by_paper() {
+        return;
+    }
+    let ledger = &talk.ledger;
+    let speaks = |p: &Phrase| p.label().is_some_and(|name| ledger.label(name.as_str()) == Some(label));
+    let about = |l: &Locate| speaks(&l.figure) || l.landmarks.iter().any(speaks);
+    let of = |u: &u32| &ledger.entries()[*u as usize];
+    let due = ledger.descriptions().filter(|u| located(&of(u).parse).iter().any(|(_, l)| about(l)));
+    let due: Vec<(u32, Parse, Vertex)> = due.map(|u| (u, of(&u).parse.clone(), of(&u).held)).collect();
+    for (utterance, parse, held) in due {
+        ground(talk, filter, (utterance, &parse, held), here.poses, &here.path_m);
     }
 }
 
@@ -299,13 +291,12 @@ fn narrowing(modifiers: &Modifiers, landmark: Option<&Phrase>) -> Narrowing {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Config;
+    use crate::config::Config;
     use crate::effects::HeardStatus;
     use crate::event::Utterance;
     use crate::language::Name;
     use crate::language::grammar::parse::parse;
     use crate::smoothing::Factor;
-    use crate::talk::listen::Here;
     use nalgebra::{Matrix3, Vector3};
 
     #[test]
@@ -342,7 +333,7 @@ mod tests {
     /// Two particles that know a gym and a kitchen, in the first 20 m and in the second 3 m apart, and the
     /// log-weight of the second over that of the first once a sentence is said on the way.
     fn weighed(sentence: &str) -> f64 {
-        let mut filter = Filter::new(Config::default());
+        let (mut talk, mut filter) = (Talk::default(), Filter::new(Config::default()));
         let structure = Arc::make_mut(&mut filter.structure);
         for _ in 0..21 {
             let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
@@ -363,7 +354,7 @@ mod tests {
         for (held, text) in [(0, "this is the gym"), (20, "this is the kitchen"), (10, sentence)] {
             let here = Here { held: Some(held), poses: &|p| p.belief.poses(), path_m: path_m.clone() };
             let u = Utterance { id: text.into(), text: text.into(), ..Utterance::default() };
-            assert_eq!(filter.hear(&u, &here).status, HeardStatus::Understood);
+            assert_eq!(talk.hear(&mut filter, &u, &here).status, HeardStatus::Understood);
         }
         let length_m = |p: &Particle| p.belief.pose(20).x_m;
         let (near, apart): (Vec<_>, Vec<_>) = filter.particles.iter().partition(|p| length_m(p) < 10.0);

@@ -1,17 +1,17 @@
 //! Step 3 of Algorithm 1, the sentences: what each says and what becomes of it.
 
-use crate::edge::PlaceId;
-use crate::edge::Vertex;
+use crate::edge::{PlaceId, Vertex};
 use crate::effects::{Heard, HeardStatus};
 use crate::event::{StampNs, Utterance};
 use crate::filter::Filter;
 use crate::filter::labels::Source;
-use crate::filter::particle::Particle;
-use crate::geometry::Pose2;
 use crate::language;
 use crate::language::act::{Content, Head, Parse, Phrase};
 use crate::talk::describe::located;
 use crate::talk::ledger::{Entry, UTTERANCES_MAX};
+use crate::talk::mend::undo;
+use crate::talk::take_in::take_in;
+use crate::talk::{Here, Talk};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_4;
 use std::sync::Arc;
@@ -37,121 +37,110 @@ const SIDES: [&str; 8] = [
     "ahead on the right",
 ];
 
-/// Where the robot is while it listens.
-pub struct Here<'a> {
-    /// The place held when the sentence began; none before the first scan.
-    pub held: Option<Vertex>,
-    /// For one particle: the poses of all places, those not frozen yet included.
-    pub poses: &'a (dyn Fn(&Particle) -> Vec<Pose2> + Sync),
-    /// Path travelled up to each place, metres.
-    pub path_m: Vec<f64>,
+/// Takes a sentence: parses it, weighs every particle by it and updates its labels.
+pub(crate) fn hear(talk: &mut Talk, filter: &mut Filter, u: &Utterance, here: &Here) -> Heard {
+    if !filter.config.language {
+        let words = "Nobody listens: language is switched off.".to_owned();
+        return heard(u, HeardStatus::Refused, &Parse::default(), words);
+    }
+    if talk.ledger.has(&u.id) {
+        let parse = language::parse_hearings(&u.text, &u.alternatives);
+        let words = format!("{} (I had heard that already.)", words(talk, &parse));
+        return heard(u, HeardStatus::Understood, &parse, words);
+    }
+    let retracted = u
+        .retracts
+        .as_ref()
+        .map(|id| undo(talk, filter, Some(id)).unwrap_or_else(|why| format!("But {why}.")));
+    let mut heard = hear_anew(talk, filter, u, here);
+    if let Some(retracted) = retracted {
+        heard.words = format!("{retracted} {}", heard.words);
+    }
+    heard
 }
 
-impl Filter {
-    /// Takes a sentence: parses it, weighs every particle by it and updates its labels.
-    pub fn hear(&mut self, u: &Utterance, here: &Here) -> Heard {
-        if !self.config.language {
-            let words = "Nobody listens: language is switched off.".to_owned();
-            return heard(u, HeardStatus::Refused, &Parse::default(), words);
-        }
-        if self.ledger.has(&u.id) {
-            let parse = language::parse_hearings(&u.text, &u.alternatives);
-            let words = format!("{} (I had heard that already.)", self.words(&parse));
-            return heard(u, HeardStatus::Understood, &parse, words);
-        }
-        let retracted =
-            u.retracts.as_ref().map(|id| self.undo(Some(id)).unwrap_or_else(|why| format!("But {why}.")));
-        let mut heard = self.hear_anew(u, here);
-        if let Some(retracted) = retracted {
-            heard.words = format!("{retracted} {}", heard.words);
-        }
-        heard
+fn hear_anew(talk: &mut Talk, filter: &mut Filter, u: &Utterance, here: &Here) -> Heard {
+    let mut parse = language::parse_hearings(&u.text, &u.alternatives);
+    language::resolve_it(&mut parse, topic(talk, u.began_ns));
+    let words = words(talk, &parse);
+    if parse.acts().iter().all(|act| matches!(act.content, Content::Ignored(_))) {
+        return heard(u, HeardStatus::NotUnderstood, &parse, words);
     }
+    if !parse.acts().iter().any(|act| act.content.asserts()) {
+        return heard(u, HeardStatus::Understood, &parse, words);
+    }
+    let Some(held) = here.held else {
+        let words = format!("{words} But I have seen nothing yet: say it again when I have moved.");
+        return heard(u, HeardStatus::Refused, &parse, words);
+    };
+    if talk.ledger.is_full() {
+        let words = format!("{words} But I can't keep more than {UTTERANCES_MAX} sentences.");
+        return heard(u, HeardStatus::Refused, &parse, words);
+    }
+    let entry = Entry {
+        id: u.id.clone(),
+        stamp_ns: u.began_ns,
+        text: u.text.clone(),
+        parse: parse.clone(),
+        held,
+        stands: true,
+    };
+    let describes = !located(&parse).is_empty();
+    let number = Arc::make_mut(&mut talk.ledger).enter(entry, describes);
+    take_in(talk, filter, (number, &parse, held), here);
+    let mut heard = heard(u, HeardStatus::Understood, &parse, words);
+    heard.grounded = told(filter, number);
+    heard.words += unplaced(&parse);
+    if describes {
+        heard.words += &put(filter, number, held, here);
+    }
+    heard
+}
 
-    fn hear_anew(&mut self, u: &Utterance, here: &Here) -> Heard {
-        let mut parse = language::parse_hearings(&u.text, &u.alternatives);
-        language::resolve_it(&mut parse, self.topic(u.began_ns));
-        let words = self.words(&parse);
-        if parse.acts().iter().all(|act| matches!(act.content, Content::Ignored(_))) {
-            return heard(u, HeardStatus::NotUnderstood, &parse, words);
-        }
-        if !parse.acts().iter().any(|act| act.content.asserts()) {
-            return heard(u, HeardStatus::Understood, &parse, words);
-        }
-        let Some(held) = here.held else {
-            let words = format!("{words} But I have seen nothing yet: say it again when I have moved.");
-            return heard(u, HeardStatus::Refused, &parse, words);
-        };
-        if self.ledger.is_full() {
-            let words = format!("{words} But I can't keep more than {UTTERANCES_MAX} sentences.");
-            return heard(u, HeardStatus::Refused, &parse, words);
-        }
-        let entry = Entry {
-            id: u.id.clone(),
-            stamp_ns: u.began_ns,
-            text: u.text.clone(),
-            parse: parse.clone(),
-            held,
-            stands: true,
-        };
-        let describes = !located(&parse).is_empty();
-        let number = Arc::make_mut(&mut self.ledger).enter(entry, describes);
-        self.take_in(number, &parse, held, here);
-        let mut heard = heard(u, HeardStatus::Understood, &parse, words);
-        heard.grounded = self.told(number);
-        heard.words += unplaced(&parse);
-        if describes {
-            heard.words += &self.put(number, held, here);
-        }
-        heard
-    }
+/// What the newest sentence spoke of, if that is not too long ago for "it".
+fn topic(talk: &Talk, now_ns: StampNs) -> Option<&Phrase> {
+    let newest = talk.ledger.entries().last().filter(|e| e.stands)?;
+    let since_ns = now_ns.saturating_sub(newest.stamp_ns);
+    (0..=TOPIC_NS).contains(&since_ns).then(|| language::topic(&newest.parse)).flatten()
+}
 
-    /// What the newest sentence spoke of, if that is not too long ago for "it".
-    fn topic(&self, now_ns: StampNs) -> Option<&Phrase> {
-        let newest = self.ledger.entries().last().filter(|e| e.stands)?;
-        let since_ns = now_ns.saturating_sub(newest.stamp_ns);
-        (0..=TOPIC_NS).contains(&since_ns).then(|| language::topic(&newest.parse)).flatten()
+/// Where a description was put, in words.
+fn put(filter: &Filter, utterance: u32, held: Vertex, here: &Here) -> String {
+    let poses = (here.poses)(filter.best());
+    let grounded = filter.best().labels.evidence().iter();
+    let grounded: Vec<_> =
+        grounded.filter(|e| e.utterance == utterance && e.source == Source::Grounded).collect();
+    let seen: f64 = grounded.iter().map(|e| e.weight).sum();
+    let likeliest = grounded.iter().max_by(|a, b| a.weight.total_cmp(&b.weight).then(b.place.cmp(&a.place)));
+    let Some(likeliest) = likeliest.filter(|_| seen > NOT_SEEN_MAX) else {
+        return " I think I have not seen it yet.".to_owned();
+    };
+    let off = poses[held as usize].between(&poses[likeliest.place as usize]);
+    let (distance_m, bearing_rad) = (off.x_m.hypot(off.y_m), off.y_m.atan2(off.x_m));
+    if distance_m < HERE_M {
+        return " I think that is here.".to_owned();
     }
+    let side = SIDES[((bearing_rad / FRAC_PI_4).round() as i32).rem_euclid(8) as usize];
+    format!(" I think that is some {distance_m:.0} m from here, {side}.")
+}
 
-    /// Where a description was put, in words.
-    fn put(&self, utterance: u32, held: Vertex, here: &Here) -> String {
-        let poses = (here.poses)(self.best());
-        let grounded = self.best().labels.evidence().iter();
-        let grounded: Vec<_> =
-            grounded.filter(|e| e.utterance == utterance && e.source == Source::Grounded).collect();
-        let seen: f64 = grounded.iter().map(|e| e.weight).sum();
-        let likeliest =
-            grounded.iter().max_by(|a, b| a.weight.total_cmp(&b.weight).then(b.place.cmp(&a.place)));
-        let Some(likeliest) = likeliest.filter(|_| seen > NOT_SEEN_MAX) else {
-            return " I think I have not seen it yet.".to_owned();
-        };
-        let off = poses[held as usize].between(&poses[likeliest.place as usize]);
-        let (distance_m, bearing_rad) = (off.x_m.hypot(off.y_m), off.y_m.atan2(off.x_m));
-        if distance_m < HERE_M {
-            return " I think that is here.".to_owned();
+fn words(talk: &Talk, parse: &Parse) -> String {
+    language::words(parse.acts(), |name| talk.ledger.label(name.as_str()).is_some())
+}
+
+/// Where the best particle put an utterance, likeliest first.
+fn told(filter: &Filter, utterance: u32) -> Vec<(PlaceId, f64)> {
+    let mut sums: BTreeMap<Vertex, f64> = BTreeMap::new();
+    for e in filter.best().labels.evidence() {
+        if e.utterance == utterance && e.source != Source::Denied {
+            *sums.entry(e.place).or_insert(0.0) += e.weight;
         }
-        let side = SIDES[((bearing_rad / FRAC_PI_4).round() as i32).rem_euclid(8) as usize];
-        format!(" I think that is some {distance_m:.0} m from here, {side}.")
     }
-
-    fn words(&self, parse: &Parse) -> String {
-        language::words(parse.acts(), |name| self.ledger.label(name.as_str()).is_some())
-    }
-
-    /// Where the best particle put an utterance, likeliest first.
-    fn told(&self, utterance: u32) -> Vec<(PlaceId, f64)> {
-        let mut sums: BTreeMap<Vertex, f64> = BTreeMap::new();
-        for e in self.best().labels.evidence() {
-            if e.utterance == utterance && e.source != Source::Denied {
-                *sums.entry(e.place).or_insert(0.0) += e.weight;
-            }
-        }
-        let mut told: Vec<(PlaceId, f64)> =
-            sums.into_iter().map(|(v, p)| (PlaceId::from(v), p.min(1.0))).collect();
-        told.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        told.truncate(GROUNDED_TOLD);
-        told
-    }
+    let mut told: Vec<(PlaceId, f64)> =
+        sums.into_iter().map(|(v, p)| (PlaceId::from(v), p.min(1.0))).collect();
+    told.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    told.truncate(GROUNDED_TOLD);
+    told
 }
 
 /// What is told of an assertion that was understood, but of nothing that can be put anywhere.

@@ -1,8 +1,63 @@
 //! What sentences do to the posterior: step 3 of Algorithm 1, and the words' share of step 4.
+//!
+//! ```text
+//! sentence ─ listen ─▶ language ─▶ take_in ─▶ ledger, labels, predictive (weights)
+//!                                  describe ─▶ labels: grounded when said, and again as the map grows
+//! "no, …", undo ─ mend ─▶ the same taken back
+//! ```
 
 mod describe;
 pub mod ledger;
-pub mod listen;
+mod listen;
 mod mend;
 pub mod predictive;
 mod take_in;
+
+use crate::edge::Vertex;
+use crate::effects::Heard;
+use crate::event::{Command, Utterance};
+use crate::filter::Filter;
+use crate::filter::particle::Particle;
+use crate::geometry::Pose2;
+use ledger::Ledger;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// Where the robot is while it listens.
+pub struct Here<'a> {
+    /// The place held when the sentence began; none before the first scan.
+    pub held: Option<Vertex>,
+    /// For one particle: the poses of all places, those not frozen yet included.
+    pub poses: &'a (dyn Fn(&Particle) -> Vec<Pose2> + Sync),
+    /// Path travelled up to each place, metres.
+    pub path_m: Vec<f64>,
+}
+
+/// All that was said of one map.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Talk {
+    /// What was said.
+    pub ledger: Arc<Ledger>,
+}
+
+impl Talk {
+    /// Takes a sentence: parses it, weighs every particle by it and updates its labels.
+    pub fn hear(&mut self, filter: &mut Filter, u: &Utterance, here: &Here) -> Heard {
+        listen::hear(self, filter, u, here)
+    }
+
+    /// Does what an operator asks, and tells what was done or why not.
+    pub fn mend(&mut self, filter: &mut Filter, command: &Command) -> Result<String, String> {
+        mend::mend(self, filter, command)
+    }
+
+    /// Grounds some descriptions again, one after the other in turn, in the map as it is now.
+    pub fn reground(&mut self, filter: &mut Filter) {
+        describe::reground(self, filter);
+    }
+
+    /// Grounds all descriptions again.
+    pub fn reground_all(&mut self, filter: &mut Filter) {
+        describe::reground_all(self, filter);
+    }
+}

@@ -1,14 +1,16 @@
 //! The core from events to answers, on a simulated ring corridor.
 
+mod alike;
 mod talk;
 mod world;
 
-use toponym_core::answers::query::{Answer, Query, WhereAnswer};
+use toponym_core::answers::query::{Answer, EdgeView, Query, WhereAnswer};
 use toponym_core::edge::EdgeKind;
 use toponym_core::effects::{Effect, Effects, HeardStatus, TrackState};
 use toponym_core::event::{Event, Odom, Scan};
 use toponym_core::geometry::Pose2;
 use toponym_core::mapper::SaveError;
+use toponym_core::trial::{ForcedLoop, Trial};
 use toponym_core::{Config, Mapper};
 use world::{drive, events, laser, say};
 
@@ -182,20 +184,38 @@ fn a_resent_sentence_changes_nothing() {
 }
 
 #[test]
-fn words_propose_the_edge_between_two_visits() {
+fn words_close_the_loop_where_nearness_proposes_nothing() {
     let poses = drive(2);
     let lap = poses.len() / 2;
     let said = [(40, "this is the kitchen"), (lap + 40, "this is the kitchen again")];
-    let kinds = |config: Config| {
-        let mut mapper = Mapper::new(config);
-        run(&mut mapper, &events(&poses, &laser(), &said));
-        mapper.step(Event::Flush);
-        let edges = mapper.snapshot().graph().particles[0].edges.clone();
-        edges.iter().filter(|e| e.kind == EdgeKind::Semantic).count()
+    // γ so large that no distance proposes an edge.
+    let off_m = |config: Config| {
+        let mut mapper = Mapper::new(Config { gamma_per_m2: 1e9, ..config });
+        let mut effects = run(&mut mapper, &events(&poses, &laser(), &said));
+        effects.extend(mapper.step(Event::Flush));
+        worst_error_m(&mapper, &effects, &poses)
     };
-    assert!(kinds(Config::default()) > 0);
-    assert_eq!(kinds(Config { semantic_edges: false, ..Config::default() }), 0);
-    assert_eq!(kinds(Config { language: false, ..Config::default() }), 0);
+    let with = off_m(Config::default());
+    let without = [
+        Config { semantic_edges: false, ..Config::default() },
+        Config { language: false, ..Config::default() },
+    ];
+    for config in without {
+        let without = off_m(config);
+        assert!(with < 0.5 * without, "{with} m with words, {without} m without");
+    }
+}
+
+#[test]
+fn a_forced_loop_is_in_every_graph() {
+    let i_from_j = Pose2::new(1.0, 2.0, 0.5);
+    let trial = Trial { force_loops: vec![ForcedLoop { i: 2, j: 9, i_from_j }], ..Trial::default() };
+    let mut mapper = Mapper::on_trial(Config::default(), trial);
+    run(&mut mapper, &events(&drive(1)[..90], &laser(), &[]));
+    mapper.step(Event::Flush);
+    let graph = mapper.snapshot().graph();
+    let forced = |e: &EdgeView| (e.i, e.j) == (2, 9) && e.i_from_j == i_from_j;
+    assert!(graph.particles.iter().all(|p| p.edges.iter().any(forced)));
 }
 
 #[test]

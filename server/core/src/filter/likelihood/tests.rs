@@ -87,8 +87,8 @@ fn a_false_edge_loses_to_its_twin_without_and_a_true_one_loses_nothing() {
 fn a_step_of_the_filter_weighs_by_it() {
     let further = Pose2::new(0.4, 0.1, 0.1);
     let mut filter = Filter::new(Config { loops: false, ..Config::default() });
-    filter.step(left(0, 0.0, None, content(&ROOM, &OLD)));
-    filter.step(left(1, 20.0, None, content(&ROOM, &NEW)));
+    filter.step(left(0, 0.0, None, content(&ROOM, &OLD)), &|_, _| {});
+    filter.step(left(1, 20.0, None, content(&ROOM, &NEW)), &|_, _| {});
     let covariance = Matrix3::from_diagonal_element(1e-4);
     let [real, wrong, _] = edges();
     let twins = [(0, real), (1, wrong)].map(|(revisit, i_from_j)| {
@@ -99,7 +99,7 @@ fn a_step_of_the_filter_weighs_by_it() {
         twin
     });
     filter.particles = twins.to_vec();
-    filter.step(left(2, 21.0, Some(further), content(&ROOM, &NEW.compose(&further))));
+    filter.step(left(2, 21.0, Some(further), content(&ROOM, &NEW.compose(&further))), &|_, _| {});
     assert_eq!(filter.best().edges[0].i_from_j, real);
     assert!((0.6..1.0).contains(&filter.best().weight()), "{}", filter.best().weight());
 }
@@ -112,14 +112,23 @@ fn another_hall_is_not_the_room() {
 }
 
 #[test]
-fn who_drifted_is_not_punished_and_who_is_certain_of_the_same_is() {
+fn who_is_certain_of_a_false_pose_pays() {
     let graph = room_twice();
-    let factor = |sigma| {
-        let (structure, all) = particles(edges()[1], sigma, &[None]);
-        log_factor(&graph, &structure, &all[0], 1)
-    };
-    assert_eq!(factor(1.0).to_bits(), 0.0f64.to_bits());
-    assert!(factor(0.02) < -0.5);
+    let (structure, all) = particles(edges()[1], 0.02, &[None]);
+    assert!(log_factor(&graph, &structure, &all[0], 1) < -0.5);
+}
+
+/// Furniture was moved: the true loop must not lose to the graph that only does not know where it is.
+#[test]
+#[ignore = "only contradiction weighs so far, and only where a graph is certain: ignorance is rewarded"]
+fn not_knowing_is_worth_no_more_than_being_right() {
+    let mut moved = content(&ROOM, &NEW);
+    moved.sample.iter_mut().step_by(2).for_each(|p| (p.x, p.y) = (0.6 * p.x, 0.6 * p.y));
+    let graph = two_visits(content(&ROOM, &OLD), moved);
+    let real = edges()[0];
+    let (structure, mut all) = particles(real, 3.0, &[Some(real), None]);
+    weigh_overlaps(&graph, &structure, &mut all, 1);
+    assert!(all[0].log_weight >= all[1].log_weight, "{} {}", all[0].log_weight, all[1].log_weight);
 }
 
 #[test]

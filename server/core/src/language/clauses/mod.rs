@@ -10,8 +10,9 @@
 mod chunks;
 mod extents;
 
-use crate::language::clauses::chunks::{CONNECTIVES, COPULAS, MOTION, RELATIONS, SEEING};
-use crate::language::clauses::chunks::{Token, eats, is_one_of, relation_alone, tokens};
+use crate::language::clauses::chunks::{
+    CONNECTIVES, COPULAS, MOTION, RELATIONS, SEEING, Token, eats, is_one_of, relation_alone, tokens,
+};
 use crate::language::clauses::extents::{clause_starts, ends_landmark, verb_end};
 use std::ops::Range;
 

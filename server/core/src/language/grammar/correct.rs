@@ -3,8 +3,8 @@
 use crate::language::act::{Act, Content, Head, Locate, Phrase, Sameness};
 use crate::language::grammar::build::{Readings, label, locate_all, negate, one};
 use crate::language::grammar::cursor::Cursor;
-use crate::language::grammar::label::{named, plausible};
 use crate::language::grammar::locate::{located, renamed};
+use crate::language::grammar::naming::{named, plausible};
 use crate::language::lexicon::is_function_word;
 
 /// Said before a clause: what was said before was wrong.

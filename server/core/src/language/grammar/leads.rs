@@ -4,7 +4,7 @@ use crate::language::act::{Head, Phrase};
 use crate::language::grammar::attach::Weighed;
 use crate::language::grammar::build::{Readings, locate_all, one};
 use crate::language::grammar::cursor::Cursor;
-use crate::language::grammar::locate::figures;
+use crate::language::grammar::figures::figures;
 use crate::language::grammar::noun_phrase::{Determiner, NounPhrase};
 use crate::language::grammar::relate::Related;
 use crate::language::lexicon::names::{Kind, Name};

@@ -7,8 +7,9 @@ use crate::language::grammar::attribute::attribute;
 use crate::language::grammar::build::{Readings, label, locate_all, negate, one, shaped};
 use crate::language::grammar::copula::{Copula, LIKELY};
 use crate::language::grammar::cursor::Cursor;
-use crate::language::grammar::label::{named, plausible};
+use crate::language::grammar::figures::{MAX_FIGURES, figures, fits, is_door};
 use crate::language::grammar::leads::{at_fork, leads};
+use crate::language::grammar::naming::{named, plausible};
 use crate::language::grammar::noun_phrase::{Determiner, NounPhrase};
 use crate::language::grammar::pointed::where_kept;
 use crate::language::grammar::presents::presents;
@@ -17,8 +18,6 @@ use crate::language::grammar::repair::{guessed, mended};
 use crate::language::lexicon::names::Kind;
 use crate::language::relation::Relation as R;
 
-/// Figures of one clause ("the kitchen and the lounge are …").
-const MAX_FIGURES: usize = 4;
 /// Reads a clause that locates something.
 pub(crate) fn locate_clause(at: &mut Cursor) -> Option<Readings> {
     let start = *at;
@@ -292,44 +291,6 @@ fn belongs(at: &mut Cursor, subject: &NounPhrase, readings: &Weighed<Phrase>) ->
     let all =
         readings.iter().map(|(w, p)| (*w, vec![Content::Alias { also: owned(p, &owner), what: p.clone() }]));
     place.then(|| Readings::new(all.collect()))
-}
-
-pub(crate) fn is_door(phrase: &Phrase) -> bool {
-    let Head::Named(name) = &phrase.head else { return phrase.head == Head::Place };
-    ["door", "doorway", "opening"].iter().any(|d| name.as_str().ends_with(d))
-}
-
-/// The figures of a clause, without what follows them.
-pub(crate) fn figures(at: &mut Cursor, presented: bool) -> Option<Vec<NounPhrase>> {
-    let mut all = vec![at.noun_phrase()?];
-    while all.len() < MAX_FIGURES {
-        let start = *at;
-        let more = at.eat_any("and also|and|, and").and_then(|_| at.noun_phrase());
-        match more.filter(|m| fits(m, presented)) {
-            Some(more) if !at.sees("is|are") => all.push(more),
-            _ => {
-                *at = start;
-                break;
-            }
-        }
-    }
-    all.iter().all(|f| fits(f, presented)).then_some(all)
-}
-
-/// What a clause may locate: no door unless it is told from others, and an indefinite one only where the
-/// sentence presents it ("there is a lab …").
-fn fits(phrase: &NounPhrase, presented: bool) -> bool {
-    let known = phrase.kind == Kind::Place;
-    let fits = match phrase.determiner {
-        Determiner::Definite => {
-            known || phrase.kind == Kind::Open || (phrase.kind == Kind::Vague && phrase.is_told())
-        }
-        Determiner::None | Determiner::Indefinite | Determiner::Possessive | Determiner::Demonstrative => {
-            known
-        }
-    };
-    let told = phrase.is_told() && !presented;
-    fits && (told || !is_door(&phrase.phrase))
 }
 
 /// The figures where the chain says, if either surely are places.

@@ -5,7 +5,7 @@ use crate::language::grammar::attribute::attribute;
 use crate::language::grammar::build::{Readings, label, locate_all, one, shaped};
 use crate::language::grammar::copula::Copula;
 use crate::language::grammar::cursor::Cursor;
-use crate::language::grammar::label::{SPOT, called, named, plausible};
+use crate::language::grammar::naming::{SPOT, called, named, plausible};
 use crate::language::grammar::noun_phrase::{Determiner, NounPhrase};
 use crate::language::grammar::relate::Related;
 use crate::language::lexicon::names::{Kind, Name};

@@ -4,8 +4,7 @@ use crate::language::act::{Head, Modifiers, Phrase, Restriction};
 use crate::language::grammar::cursor::Cursor;
 use crate::language::grammar::noun_phrase::Determiner;
 use crate::language::lexicon::names::Kind;
-use crate::language::relation::Relation;
-use crate::language::relation::Relation as R;
+use crate::language::relation::{Relation, Relation as R};
 
 /// "Just past the entrance".
 #[derive(Clone, Debug)]

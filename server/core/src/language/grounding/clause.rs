@@ -1,6 +1,7 @@
 //! What grounding is asked: a clause as plain numbers, its words already looked up.
 
-use crate::language::{Frame, Relation};
+use crate::language::act::Frame;
+use crate::language::relation::Relation;
 
 /// What narrows a relation.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -78,7 +78,7 @@ impl Doors {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::language::GroundPlace;
+    use crate::language::grounding::place::GroundPlace;
     use crate::language::grounding::scales::Scales;
 
     #[test]

@@ -4,7 +4,6 @@
 //! paths, a template for the others. Divided by its integral it is a density over the floor (per m²).
 //! Scales are chosen on plans ([`Scales::FITTED`]), but for those in [`reach_m`] that no plan tells of.
 
-use crate::language::Relation;
 use crate::language::act::Frame;
 use crate::language::grounding::clause::Narrowing;
 use crate::language::grounding::doors::Doors;
@@ -14,6 +13,7 @@ use crate::language::grounding::path_factors::PathFactor;
 use crate::language::grounding::scales::Scales;
 use crate::language::grounding::scene::{Scene, WAY_HALF_M, unit};
 use crate::language::grounding::ways::Step;
+use crate::language::relation::Relation;
 
 /// "Down the hallway" said in the hallway means ahead, rather than behind, with this probability.
 const AHEAD: f64 = 0.8;

@@ -7,25 +7,13 @@
 //! how far an unknown figure is trusted to be in the map. (The paper's σ(−d/30 m) for "near" has no
 //! scale of its own and can't say "not here yet".)
 
-use crate::language::Relation;
 use crate::language::act::Frame;
 use crate::language::grounding::clause::{LandmarkBelief, Reading};
 use crate::language::grounding::factor::{Factor, Target};
+use crate::language::grounding::place::GroundPlace;
 use crate::language::grounding::scales::Scales;
 use crate::language::grounding::scene::Scene;
-
-/// A place as grounding sees it, in one particle's map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct GroundPlace {
-    /// Position in the map.
-    pub x_m: f64,
-    /// Position in the map.
-    pub y_m: f64,
-    /// Heading of the robot at the place, in the map.
-    pub yaw_rad: f64,
-    /// Path travelled up to the place.
-    pub path_m: f64,
-}
+use crate::language::relation::Relation;
 
 /// Which place is the figure; `p` and `p_elsewhere` sum to one.
 #[derive(Clone, Debug, PartialEq)]

@@ -10,6 +10,7 @@ pub(crate) mod paper;
 pub(crate) mod path_factors;
 pub(crate) mod path_features;
 pub(crate) mod path_weights;
+pub(crate) mod place;
 pub(crate) mod scales;
 pub(crate) mod scene;
 pub(crate) mod ways;

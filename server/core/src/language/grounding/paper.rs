@@ -1,6 +1,6 @@
 //! The paper's own grounding, as its notes have it: the baseline of every comparison.
 
-use crate::language::grounding::ground::GroundPlace;
+use crate::language::grounding::place::GroundPlace;
 use crate::language::relation::Relation;
 
 /// Scale of σ(−d / 30 m), which "near" was.

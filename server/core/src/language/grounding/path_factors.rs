@@ -1,10 +1,10 @@
 //! Factors of path relations, learned: logistic regression on [`path_features`](super::path_features).
 
-use crate::language::Relation;
 use crate::language::grounding::footprint::Footprint;
 use crate::language::grounding::path_features::{FEATURES, GAP_MIN, features_of_steps};
 use crate::language::grounding::path_weights::PATH_WEIGHTS;
 use crate::language::grounding::ways::Step;
+use crate::language::relation::Relation;
 
 /// Least step in which a path is searched.
 const STEP_M: f64 = 0.2;

@@ -1,7 +1,7 @@
 //! Weights of path relations, as `examples/relations` writes them: change nothing by hand.
 
-use crate::language::Relation;
 use crate::language::grounding::path_features::FEATURES;
+use crate::language::relation::Relation;
 
 /// Relation, weight per feature, constant.
 #[rustfmt::skip]

@@ -2,7 +2,7 @@
 //! what the path driven tells of a landmark's shape and of how it lies to the hallway.
 
 use crate::language::grounding::footprint::Footprint;
-use crate::language::grounding::ground::GroundPlace;
+use crate::language::grounding::place::GroundPlace;
 use crate::language::grounding::scales::Scales;
 use crate::language::grounding::ways::Ways;
 use std::cell::OnceCell;

@@ -3,7 +3,7 @@
 //! A straight line goes through walls; people mean the way one walks. Places are joined to the next
 //! on the path driven and to those of other passes close by.
 
-use crate::language::grounding::ground::GroundPlace;
+use crate::language::grounding::place::GroundPlace;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 

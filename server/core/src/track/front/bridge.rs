@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 /// The new local map is matched with the old one while it is no longer than this.
 const TRY_PATH_M: f64 = 8.0;
 /// Fits below are no fits.
-const SCORE_MIN: f64 = 0.75;
+const BRIDGE_SCORE_MIN: f64 = 0.75;
 /// Share of the points that both local maps must see.
 const OVERLAP_MIN: f64 = 0.15;
 /// 99 % of three degrees of freedom: what odometry does not allow is a look-alike.
@@ -168,7 +168,7 @@ fn tie(shore: &Content, here: &Content, covariance: &Matrix3<f64>) -> Option<Mod
         let e = m.i_from_j.log();
         (covariance + m.covariance).try_inverse().is_some_and(|s| e.dot(&(s * e)) < ALLOWED)
     };
-    let good = |m: &Mode| m.score >= SCORE_MIN && m.overlap >= OVERLAP_MIN;
+    let good = |m: &Mode| m.score >= BRIDGE_SCORE_MIN && m.overlap >= OVERLAP_MIN;
     let target = index(shore);
     let mut fits: Vec<Mode> = guesses(shore, here, covariance)
         .iter()

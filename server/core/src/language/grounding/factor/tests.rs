@@ -1,5 +1,5 @@
 use super::*;
-use crate::language::GroundPlace;
+use crate::language::grounding::place::GroundPlace;
 use proptest::prelude::*;
 
 /// Along x, into a room at x = 12 and out again, on to 30.

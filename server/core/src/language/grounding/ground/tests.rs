@@ -1,5 +1,5 @@
 use super::*;
-use crate::language::Narrowing;
+use crate::language::grounding::clause::Narrowing;
 use proptest::prelude::*;
 
 /// A clause with one reading and one landmark.
