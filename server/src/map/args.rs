@@ -3,8 +3,9 @@
 use super::trajectory::Format;
 use anyhow::{Result, bail};
 use std::path::{Path, PathBuf};
-use toponym_core::Config;
 use toponym_core::config::Rules;
+use toponym_core::trial::{ForcedLoop, Trial};
+use toponym_core::{Config, Pose2};
 
 /// Rules by which sentences are taken in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
@@ -12,8 +13,10 @@ pub enum Preset {
     /// All that is understood, grounded again as the map grows
     #[default]
     Toponym,
-    /// The paper's own, for comparison: names and plain relations, grounded once by σ(−d / 30 m)
-    Paper,
+    /// Sentences as in the paper: names and plain relations, grounded once by σ(−d / 30 m); all else as ever
+    PaperGrounding,
+    /// The paper's baseline: names are noted, but propose no edges and weigh nothing
+    PaperNoLanguage,
 }
 
 /// Map a recorded log and answer questions about it.
@@ -50,6 +53,10 @@ pub struct MapArgs {
     /// Replace this share of the matched loop transforms by random ones, to see the map survive it
     #[arg(long, value_name = "FRACTION", conflicts_with = "start_map", value_parser = share)]
     pub inject_loops: Option<f64>,
+    /// Put a loop edge into every graph, to see it undone: newer place, older place, and where the newer lies
+    /// from there in metres and degrees; may be given many times
+    #[arg(long, value_name = "J,I,X,Y,DEGREES", conflicts_with = "start_map", value_parser = forced, allow_hyphen_values = true)]
+    pub force_loop: Vec<ForcedLoop>,
     /// Ask the finished map; may be given many times
     #[arg(long, value_name = "QUESTION")]
     pub ask: Vec<String>,
@@ -95,14 +102,19 @@ impl MapArgs {
             particles: self.particles.unwrap_or(defaults.particles),
             seed: self.seed.unwrap_or(defaults.seed),
             language: !self.no_language,
-            rules: match self.preset {
-                Preset::Toponym => Rules::Toponym,
-                Preset::Paper => Rules::Paper,
-            },
-            semantic_edges: !self.no_semantic_edges,
+            rules: self.preset.rules(),
+            semantic_edges: !self.no_semantic_edges && self.preset != Preset::PaperNoLanguage,
             loops: !self.no_loops,
-            inject_loops: self.inject_loops.unwrap_or(defaults.inject_loops),
             ..defaults
+        }
+    }
+
+    /// What is spoilt on purpose.
+    pub fn trial(&self) -> Trial {
+        Trial {
+            inject_loops: self.inject_loops.unwrap_or(0.0),
+            seed: self.config().seed,
+            force_loops: self.force_loop.clone(),
         }
     }
 
@@ -120,6 +132,30 @@ impl MapArgs {
         }
         Ok(())
     }
+}
+
+impl Preset {
+    /// How sentences are taken in.
+    pub fn rules(self) -> Rules {
+        match self {
+            Self::Toponym => Rules::Toponym,
+            Self::PaperGrounding | Self::PaperNoLanguage => Rules::Paper,
+        }
+    }
+}
+
+/// A loop edge: "120,3,0.5,-2,90".
+fn forced(text: &str) -> Result<ForcedLoop, String> {
+    let wrong = || "give newer place, older place, x, y and degrees, as 120,3,0.5,-2,90".to_owned();
+    let parts: Vec<&str> = text.split(',').map(str::trim).collect();
+    let &[j, i, x, y, degrees] = parts.as_slice() else { return Err(wrong()) };
+    let place = |text: &str| text.parse::<u32>().map_err(|_| wrong());
+    let number = |text: &str| text.parse().ok().filter(|v: &f64| v.is_finite()).ok_or_else(wrong);
+    let (i, j) = (place(i)?, place(j)?);
+    if i >= j {
+        return Err(format!("place {i} is not older than place {j}: give the newer one first"));
+    }
+    Ok(ForcedLoop { i, j, i_from_j: Pose2::new(number(x)?, number(y)?, number(degrees)?.to_radians()) })
 }
 
 /// A number from 0 to 1.

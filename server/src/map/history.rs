@@ -6,8 +6,7 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 use toponym_core::Effect;
-use toponym_core::edge::Proposal;
-use toponym_core::edge::{EdgeKind, PlaceId};
+use toponym_core::edge::{EdgeKind, PlaceId, Proposal};
 use toponym_proto::stream::Stamp;
 
 /// Writes the history file.

@@ -38,7 +38,7 @@ pub fn run(args: &MapArgs) -> Result<()> {
     };
     let mapper = match &args.start_map {
         Some(file) => load(file)?,
-        None => Mapper::new(args.config()),
+        None => Mapper::on_trial(args.config(), args.trial()),
     };
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.unwrap_or(0))
