@@ -3,6 +3,7 @@
 
 use crate::stream::Message;
 use crate::validate::Invalid;
+pub use crate::validate::{ANY_ROBOT, check_id};
 
 /// TCP port the server listens on by default.
 pub const DEFAULT_PORT: u16 = 7457;
@@ -10,24 +11,6 @@ pub const DEFAULT_PORT: u16 = 7457;
 pub const DEFAULT_ENDPOINT: &str = "tcp/127.0.0.1:7457";
 /// Site name by default.
 pub const DEFAULT_SITE: &str = "default";
-/// Stands for "the one robot there is" in the key of a sentence; no robot may bear it.
-pub const ANY_ROBOT: &str = "any";
-
-/// Checks an id: `[a-z0-9][a-z0-9_-]{0,62}`.
-pub fn check_id(field: &str, id: &str) -> Result<(), Invalid> {
-    let word = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit();
-    let ok = match id.as_bytes() {
-        [first, rest @ ..] => {
-            word(*first) && rest.len() <= 62 && rest.iter().all(|c| word(*c) || matches!(c, b'_' | b'-'))
-        }
-        [] => false,
-    };
-    if ok {
-        return Ok(());
-    }
-    let shown: String = id.chars().take(80).collect();
-    Err(Invalid::new(field, format!("{shown:?} is no id: [a-z0-9][a-z0-9_-]{{0,62}}")))
-}
 
 /// What a map can be asked.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

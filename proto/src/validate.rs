@@ -1,8 +1,10 @@
 //! Limits, and the only place that rejects.
 
-use crate::keys::{ANY_ROBOT, check_id};
 use crate::stream::{Header, Laser, Mend, Message, Pose, Say, Scan, Setup, Stamp};
 use serde::{Deserialize, Serialize};
+
+/// Stands for "the one robot there is" in the key of a sentence; no robot may bear it.
+pub const ANY_ROBOT: &str = "any";
 
 /// Why a value is refused.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
@@ -227,6 +229,22 @@ fn check_text(field: &str, text: &str, limits: &Limits) -> Result<(), Invalid> {
         return Err(Invalid::new(field, reason));
     }
     Ok(())
+}
+
+/// Checks an id: `[a-z0-9][a-z0-9_-]{0,62}`.
+pub fn check_id(field: &str, id: &str) -> Result<(), Invalid> {
+    let word = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit();
+    let ok = match id.as_bytes() {
+        [first, rest @ ..] => {
+            word(*first) && rest.len() <= 62 && rest.iter().all(|c| word(*c) || matches!(c, b'_' | b'-'))
+        }
+        [] => false,
+    };
+    if ok {
+        return Ok(());
+    }
+    let shown: String = id.chars().take(80).collect();
+    Err(Invalid::new(field, format!("{shown:?} is no id: [a-z0-9][a-z0-9_-]{{0,62}}")))
 }
 
 #[cfg(test)]
