@@ -222,6 +222,7 @@ fn graph(reply: GraphReply) -> GraphAnswer {
         count: p.count,
         weight: p.weight,
         edges: p.edges.into_iter().map(edge).collect(),
+        poses: Vec::new(),
     });
     GraphAnswer {
         epoch: reply.map.epoch,
