@@ -2,9 +2,9 @@
 //! the truth beside it. Same scenario, same bytes.
 //!
 //! ```no_run
-//! let recording = toponym::sim::Scenario::demo(1).run()?;
+//! let recording = toponym_sim::Scenario::demo(1).run()?;
 //! println!("{} messages", recording.messages.len());
-//! # Ok::<(), toponym::sim::SimError>(())
+//! # Ok::<(), toponym_sim::SimError>(())
 //! ```
 
 pub mod args;

@@ -107,7 +107,7 @@ fn flaser(text: &mut String, scan: &Scan, odom: &toponym_proto::Pose, offset_m: 
         };
         let _ = write!(text, " {range_m}");
     }
-    let [laser_x, laser_y] = super::geom::apply(odom, [offset_m, 0.0]);
+    let [laser_x, laser_y] = crate::geom::apply(odom, [offset_m, 0.0]);
     let (x, y, yaw) = (odom.x_m, odom.y_m, odom.yaw_rad);
     let t = scan.header.stamp.seconds();
     let _ = writeln!(text, " {laser_x} {laser_y} {yaw} {x} {y} {yaw} {t:.6} sim {t:.6}");
@@ -144,7 +144,7 @@ pub fn truth(recording: &Recording) -> (Value, Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{LaserModel, Scenario};
+    use crate::{LaserModel, Scenario};
     use toponym_proto::record::RecordReader;
 
     fn recording() -> Recording {

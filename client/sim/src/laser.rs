@@ -1,10 +1,10 @@
 //! A laser range finder.
 
-use super::geom::apply;
 use super::people::People;
 use super::random::Draw;
 use super::robot::Drive;
 use super::world::{Surface, World};
+use crate::geom::apply;
 use std::f64::consts::{PI, TAU};
 use toponym_proto::stream::Laser;
 
@@ -191,8 +191,8 @@ impl Post {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::geom::{Rect, compose};
-    use crate::sim::world::Plan;
+    use crate::geom::{Rect, compose};
+    use crate::world::Plan;
     use std::collections::BTreeSet;
     use toponym_proto::Pose;
 

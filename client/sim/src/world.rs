@@ -2,7 +2,7 @@
 
 use super::cast::{Buckets, Strike};
 use super::floor::Floor;
-use super::geom::{Area, Point, Rect, Segment, distance_m, outline};
+use crate::geom::{Area, Point, Rect, Segment, distance_m, outline};
 
 /// Body radius and a margin: a way keeps this far from every wall.
 const CLEARANCE_M: f64 = 0.32;
@@ -134,7 +134,7 @@ pub enum Surface {
 
 /// How one gets from waypoint to waypoint.
 #[derive(Clone, Debug)]
-pub(super) enum Ways {
+pub(crate) enum Ways {
     /// Straight between waypoints; per waypoint those in reach, with their distances in metres.
     Seen(Vec<Vec<(usize, f64)>>),
     /// Anywhere over the free floor.
@@ -158,7 +158,7 @@ pub struct World {
 
 impl World {
     /// A floor of plain walls.
-    pub(super) fn new(walls: Vec<Segment>, rooms: Vec<Room>, waypoints: Vec<Point>, ways: Ways) -> Self {
+    pub(crate) fn new(walls: Vec<Segment>, rooms: Vec<Room>, waypoints: Vec<Point>, ways: Ways) -> Self {
         let buckets = Buckets::new(&walls);
         Self { walls, surfaces: Vec::new(), rooms, waypoints, ways, buckets }
     }
@@ -179,7 +179,7 @@ impl World {
     }
 
     /// The free floor, where ways are not bound to waypoints.
-    pub(super) fn floor(&self) -> Option<&Floor> {
+    pub(crate) fn floor(&self) -> Option<&Floor> {
         match &self.ways {
             Ways::Seen(_) => None,
             Ways::Open(floor) => Some(floor),

@@ -173,8 +173,8 @@ pub fn run(args: &SimulateArgs) -> Result<String, SimulateError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::storey::tests::{ROW, TWO_ROOMS};
     use super::*;
+    use crate::storey::tests::{ROW, TWO_ROOMS};
     use clap::Parser;
     use std::f64::consts::PI;
 

@@ -2,14 +2,14 @@
 
 use super::SimError;
 use super::follow::Track;
-use super::geom::{Point, between, blend, compose, distance_m, wrap};
 use super::random::Draw;
 use super::world::World;
+use crate::geom::{Point, between, blend, compose, distance_m, wrap};
 use std::f64::consts::FRAC_PI_2;
 use toponym_proto::Pose;
 
 /// Time step of the motion, seconds.
-pub(super) const STEP_S: f64 = 0.02;
+pub(crate) const STEP_S: f64 = 0.02;
 /// A waypoint counts as passed from here, metres.
 const PASSED_M: f64 = 0.25;
 
@@ -178,9 +178,9 @@ pub fn drive(world: &World, tour: &[usize], motion: &Motion, draw: &mut Draw) ->
 }
 
 /// The robot on its way.
-pub(super) struct Body {
-    pub(super) pose: Pose,
-    pub(super) speed_mps: f64,
+pub(crate) struct Body {
+    pub(crate) pose: Pose,
+    pub(crate) speed_mps: f64,
 }
 
 impl Body {
@@ -208,7 +208,7 @@ impl Body {
     }
 
     /// Moves on for one time step.
-    pub(super) fn step(&mut self, wanted_mps: f64, turn_radps: f64, motion: &Motion, poses: &mut Vec<Pose>) {
+    pub(crate) fn step(&mut self, wanted_mps: f64, turn_radps: f64, motion: &Motion, poses: &mut Vec<Pose>) {
         let change = motion.accel_mps2 * STEP_S;
         self.speed_mps += (wanted_mps - self.speed_mps).clamp(-2.0 * change, change);
         let step = Pose { x_m: self.speed_mps * STEP_S, y_m: 0.0, yaw_rad: turn_radps * STEP_S };
@@ -220,12 +220,12 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{demo_building, random_office};
+    use crate::{demo_building, random_office};
 
     #[test]
     fn the_robot_keeps_clear_of_walls_and_within_its_speed() {
         let motion = Motion::default();
-        for world in [demo_building(), random_office(&crate::sim::OfficeStyle::default(), 3)] {
+        for world in [demo_building(), random_office(&crate::OfficeStyle::default(), 3)] {
             let tour: Vec<usize> = (0..world.rooms.len()).collect();
             let drive = drive(&world, &tour, &motion, &mut Draw::new(1, 0)).unwrap();
             for pose in drive.poses.iter().step_by(10) {

@@ -215,7 +215,7 @@ pub fn outline(free: &[Rect]) -> Vec<Segment> {
 }
 
 /// The pieces of `[from, to]` outside all intervals.
-pub(super) fn uncovered(from: f64, to: f64, mut intervals: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+pub(crate) fn uncovered(from: f64, to: f64, mut intervals: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     intervals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut pieces = Vec::new();
     let mut start = from;
