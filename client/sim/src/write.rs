@@ -137,7 +137,16 @@ pub fn truth(recording: &Recording) -> (Value, Value) {
         questions.entry(format!("where is the {name}")).or_default().push(id.clone());
         regions.insert(id, corners);
     }
-    let truth = json!({"trajectory": trajectory, "regions": regions, "path_m": recording.truth.path_m});
+    let faults: Vec<Value> = recording
+        .truth
+        .faults
+        .iter()
+        .map(|i| json!({"fault": i.fault.to_string(), "from_s": i.from_s, "to_s": i.to_s}))
+        .collect();
+    let mut truth = json!({"trajectory": trajectory, "regions": regions, "path_m": recording.truth.path_m});
+    if !faults.is_empty() {
+        truth["faults"] = json!(faults);
+    }
     (truth, json!(questions))
 }
 

@@ -105,8 +105,8 @@ fn centre(world: &World) -> Point {
 mod tests {
     use super::*;
     use crate::laser::LaserModel;
-    use crate::robot::Wheels;
     use crate::storey::tests::ROW;
+    use crate::wheels::Wheels;
     use std::path::Path;
     use toponym_proto::{Limits, Message};
 
