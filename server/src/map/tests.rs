@@ -4,7 +4,7 @@ use super::*;
 use clap::Parser;
 use serde_json::Value;
 use std::path::PathBuf;
-use toponym::sim::{Scenario, write::write_folder};
+use toponym_sim::{Scenario, write::write_folder};
 
 #[derive(Parser)]
 struct Cli {

@@ -31,6 +31,11 @@ pub fn between(a: &Pose, b: &Pose) -> Pose {
     Pose { x_m: c * dx + s * dy, y_m: -s * dx + c * dy, yaw_rad: wrap(b.yaw_rad - a.yaw_rad) }
 }
 
+/// `a⁻¹`.
+pub fn inverse(a: &Pose) -> Pose {
+    between(a, &Pose::default())
+}
+
 /// The pose a share `f` of the way from `a` to `b`.
 pub fn blend(a: &Pose, b: &Pose, f: f64) -> Pose {
     Pose {
@@ -131,6 +136,23 @@ impl Rect {
             && p[1] <= self.y1_m - margin_m
     }
 
+    /// Where the ray `origin + t·direction`, t ≥ 0, enters it; 0 from within, none if it misses.
+    pub fn entry_m(&self, origin: Point, direction: Point) -> Option<f64> {
+        let (mut enters, mut leaves) = (0.0_f64, f64::INFINITY);
+        for (k, (low, high)) in [(self.x0_m, self.x1_m), (self.y0_m, self.y1_m)].into_iter().enumerate() {
+            if direction[k].abs() < 1e-12 {
+                if origin[k] < low || origin[k] > high {
+                    return None;
+                }
+                continue;
+            }
+            let (a, b) = ((low - origin[k]) / direction[k], (high - origin[k]) / direction[k]);
+            enters = enters.max(a.min(b));
+            leaves = leaves.min(a.max(b));
+        }
+        (enters <= leaves).then_some(enters)
+    }
+
     /// Corners, counter-clockwise from the lower left.
     pub fn corners(&self) -> [Point; 4] {
         [[self.x0_m, self.y0_m], [self.x1_m, self.y0_m], [self.x1_m, self.y1_m], [self.x0_m, self.y1_m]]
@@ -215,7 +237,7 @@ pub fn outline(free: &[Rect]) -> Vec<Segment> {
 }
 
 /// The pieces of `[from, to]` outside all intervals.
-pub(super) fn uncovered(from: f64, to: f64, mut intervals: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+pub(crate) fn uncovered(from: f64, to: f64, mut intervals: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     intervals.sort_by(|a, b| a.0.total_cmp(&b.0));
     let mut pieces = Vec::new();
     let mut start = from;

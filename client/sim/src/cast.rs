@@ -1,6 +1,6 @@
 //! Ray casting: walls sorted into square buckets.
 
-use super::geom::{Point, Segment};
+use crate::geom::{Point, Segment};
 
 /// Edge of a bucket.
 const BUCKET_M: f64 = 0.5;
@@ -16,7 +16,7 @@ pub struct Strike {
 
 /// Walls sorted into square buckets: a ray looks only at those along its way.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Buckets {
+pub(crate) struct Buckets {
     origin: Point,
     columns: usize,
     rows: usize,
@@ -25,7 +25,7 @@ pub(super) struct Buckets {
 }
 
 impl Buckets {
-    pub(super) fn new(walls: &[Segment]) -> Self {
+    pub(crate) fn new(walls: &[Segment]) -> Self {
         let ends = || walls.iter().flat_map(|w| [w.a, w.b]);
         let low = |k: usize| ends().map(|p| p[k]).fold(f64::INFINITY, f64::min) - BUCKET_M;
         let high = |k: usize| ends().map(|p| p[k]).fold(f64::NEG_INFINITY, f64::max) + BUCKET_M;
@@ -65,7 +65,7 @@ impl Buckets {
     }
 
     /// Walks the buckets along the ray and takes the first wall met.
-    pub(super) fn cast(
+    pub(crate) fn cast(
         &self,
         walls: &[Segment],
         origin: Point,
@@ -118,8 +118,8 @@ impl Buckets {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::storey::tests::two_rooms;
-    use crate::sim::{World, demo_building};
+    use crate::storey::tests::two_rooms;
+    use crate::{World, demo_building};
 
     /// Casts many rays, from within and from without, against all walls.
     fn compare(world: &World, from: Point, size_m: [f64; 2]) {

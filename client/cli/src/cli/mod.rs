@@ -8,8 +8,8 @@ mod talk;
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use toponym::ClientError;
-use toponym::sim::args::SimulateArgs;
 use toponym_proto::keys::DEFAULT_SITE;
+use toponym_sim::args::SimulateArgs;
 
 /// Exit codes.
 pub mod exit {
@@ -86,7 +86,7 @@ enum Failure {
     #[error(transparent)]
     Narration(#[from] toponym::log::NarrationError),
     #[error(transparent)]
-    Simulate(#[from] toponym::sim::args::SimulateError),
+    Simulate(#[from] toponym_sim::args::SimulateError),
     #[error("DATA LOSS: the server gave up {0} messages; see its log")]
     Lost(u64),
     #[error("output: {0}")]
@@ -130,7 +130,7 @@ pub async fn run(args: Args) -> ExitCode {
 }
 
 fn simulated(args: &SimulateArgs) -> Result<u8, Failure> {
-    println!("{}", toponym::sim::args::run(args)?);
+    println!("{}", toponym_sim::args::run(args)?);
     Ok(exit::FOUND)
 }
 

@@ -3,10 +3,10 @@
 use super::doors;
 use super::floor::Floor;
 use super::floorplan::FloorPlan;
-use super::geom::{Area, Point, Segment, distance_m};
 use super::names::{Use, name_of};
 use super::random::Draw;
 use super::world::{Room, RoomKind, Surface, Ways, World};
+use crate::geom::{Area, Point, Segment, distance_m};
 
 /// What a wall is made of may change from here to there: a wall dark all along is rare.
 const PATCH_M: f64 = 2.0;
@@ -34,7 +34,7 @@ impl Storey {
     pub fn new(plan: &FloorPlan, draw: &mut Draw) -> Self {
         let built = doors::walls(plan);
         let corners =
-            |space: &super::floorplan::Space| space.contour.iter().map(|(line, _)| line.a).collect();
+            |space: &crate::floorplan::Space| space.contour.iter().map(|(line, _)| line.a).collect();
         let spaces: Vec<Area> = plan.spaces.iter().map(|s| Area { corners: corners(s) }).collect();
         let patched = built.lines.iter().flat_map(|(line, window)| patches(line).map(|p| (p, *window)));
         let (walls, windows): (Vec<_>, Vec<bool>) = patched.unzip();
@@ -88,13 +88,13 @@ fn roomiest(floor: &Floor, part: &[bool], area: &Area) -> Option<Point> {
 }
 
 #[cfg(test)]
-pub(super) mod tests {
+pub(crate) mod tests {
     use super::*;
     use std::path::Path;
 
     /// An office of 4 m by 4 m and a corridor, 0.2 m of wall between them with a door of 1 m,
     /// and a portal to nowhere at the corridor's end.
-    pub(in crate::sim) const TWO_ROOMS: &str = r#"<floor BuildingName="B" FloorName="1">
+    pub(crate) const TWO_ROOMS: &str = r#"<floor BuildingName="B" FloorName="1">
 <Scale PixelDistance="400" RealDistance="4"/>
 <space name="a" type="KONTOR"><contour>
 <centroid x="200" y="200"/>
@@ -119,7 +119,7 @@ pub(super) mod tests {
 "#;
 
     /// Three rooms of 4 m by 3 m in a row along a hallway.
-    pub(in crate::sim) const ROW: &str = r#"<floor BuildingName="B" FloorName="2">
+    pub(crate) const ROW: &str = r#"<floor BuildingName="B" FloorName="2">
 <Scale PixelDistance="10" RealDistance="1"/>
 <space name="a" type="PENTRY"><contour>
 <linesegment x1="0" y1="22" x2="15" y2="22" type="Wall"/>
@@ -160,7 +160,7 @@ pub(super) mod tests {
 </floor>
 "#;
 
-    pub(in crate::sim) fn two_rooms() -> Storey {
+    pub(crate) fn two_rooms() -> Storey {
         Storey::new(&FloorPlan::parse(TWO_ROOMS, Path::new("p.xml")).unwrap(), &mut Draw::new(1, 0))
     }
 

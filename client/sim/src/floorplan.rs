@@ -1,7 +1,7 @@
 //! Reads the floor plans of the KTH campus data set's XML format: spaces with their contours as
 //! line segments (walls, windows, portals), and the scale of the drawing.
 
-use super::geom::{Point, Segment, distance_m};
+use crate::geom::{Point, Segment, distance_m};
 use roxmltree::{Document, Node};
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
@@ -195,8 +195,8 @@ impl Space {
 
 #[cfg(test)]
 mod tests {
-    use super::super::storey::tests::TWO_ROOMS;
     use super::*;
+    use crate::storey::tests::TWO_ROOMS;
 
     fn parsed(text: &str) -> Result<FloorPlan, String> {
         FloorPlan::parse(text, Path::new("p.xml")).map_err(|e| e.to_string())

@@ -1,6 +1,6 @@
 //! `toponym simulate`.
 
-use super::{FloorPlan, LaserModel, OfficeStyle, PlanError, Scenario, SimError, Wheels, write};
+use super::{Fault, FloorPlan, LaserModel, OfficeStyle, PlanError, Scenario, SimError, Wheels, write};
 use std::path::PathBuf;
 
 /// Make a log of a simulated robot in a building, with a narration and the truth.
@@ -56,6 +56,11 @@ pub struct SimulateArgs {
     /// People walking about, whose legs the laser sees; the first is the guide, ahead of the robot.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub people: usize,
+    /// What goes wrong: slip:DEGREES or slip:METRESm (the wheels count a turn or a way that the
+    /// robot does not make), unsigned (encoders without sign), break (silence, then the odometry
+    /// restarts at 0). May be given more than once; truth.json tells when it happened.
+    #[arg(long = "fault", value_name = "FAULT")]
+    pub faults: Vec<Fault>,
 }
 
 /// Which building to simulate.
@@ -152,6 +157,7 @@ fn scenario(args: &SimulateArgs) -> Result<Scenario, SimulateError> {
         scenario.wheels = Wheels::rough();
     }
     scenario.people = args.people;
+    scenario.faults.clone_from(&args.faults);
     Ok(scenario)
 }
 
@@ -173,8 +179,8 @@ pub fn run(args: &SimulateArgs) -> Result<String, SimulateError> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::storey::tests::{ROW, TWO_ROOMS};
     use super::*;
+    use crate::storey::tests::{ROW, TWO_ROOMS};
     use clap::Parser;
     use std::f64::consts::PI;
 
@@ -219,6 +225,20 @@ mod tests {
         assert_eq!((laser.beams, laser.mount.range_max_m), ((90, 90), 8.0));
         assert!((laser.fov_rad - 1.5 * PI).abs() < 1e-12 && (laser.mount.yaw_rad + 0.5 * PI).abs() < 1e-12);
         assert!(Cli::try_parse_from(["simulate", "out", "--beams", "1"]).is_err());
+    }
+
+    #[test]
+    fn faults_are_told_in_the_truth() {
+        let args = ["simulate", "out", "--fault", "slip:90", "--fault", "break"];
+        let mut scenario = scenario(&Cli::try_parse_from(args).unwrap().simulate).unwrap();
+        scenario.tour.truncate(3);
+        let (truth, _) = write::truth(&scenario.run().unwrap());
+        assert_eq!(truth["faults"][0]["fault"], "slip:90");
+        let [from_s, to_s] = ["from_s", "to_s"].map(|k| truth["faults"][1][k].as_f64().unwrap());
+        let silent = |t_s: &f64| *t_s > from_s && *t_s < to_s;
+        let scans = truth["trajectory"].as_array().unwrap();
+        assert!(to_s > from_s + 2.9 && !scans.iter().any(|s| silent(&s[0].as_f64().unwrap())));
+        assert!(Cli::try_parse_from(["simulate", "out", "--fault", "smoke"]).is_err());
     }
 
     #[test]

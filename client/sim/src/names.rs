@@ -2,7 +2,7 @@
 
 /// What a space is for a tour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Use {
+pub(crate) enum Use {
     /// Worth a visit.
     Room,
     /// Leads from room to room.
@@ -78,7 +78,7 @@ const NAMES: [(&str, &str, Use); 61] = [
 
 /// The name of a space and what it is; `doors` decide about one without a category. An unknown
 /// category is a name in small letters; abbreviations and numbers are no names: empty.
-pub(super) fn name_of(category: &str, doors: usize) -> (String, Use) {
+pub(crate) fn name_of(category: &str, doors: usize) -> (String, Use) {
     /// With more doors than this a space without a category leads from room to room.
     const ROOM_DOORS: usize = 4;
     let capitals = category.to_uppercase();

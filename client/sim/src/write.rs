@@ -107,7 +107,7 @@ fn flaser(text: &mut String, scan: &Scan, odom: &toponym_proto::Pose, offset_m: 
         };
         let _ = write!(text, " {range_m}");
     }
-    let [laser_x, laser_y] = super::geom::apply(odom, [offset_m, 0.0]);
+    let [laser_x, laser_y] = crate::geom::apply(odom, [offset_m, 0.0]);
     let (x, y, yaw) = (odom.x_m, odom.y_m, odom.yaw_rad);
     let t = scan.header.stamp.seconds();
     let _ = writeln!(text, " {laser_x} {laser_y} {yaw} {x} {y} {yaw} {t:.6} sim {t:.6}");
@@ -137,14 +137,23 @@ pub fn truth(recording: &Recording) -> (Value, Value) {
         questions.entry(format!("where is the {name}")).or_default().push(id.clone());
         regions.insert(id, corners);
     }
-    let truth = json!({"trajectory": trajectory, "regions": regions, "path_m": recording.truth.path_m});
+    let faults: Vec<Value> = recording
+        .truth
+        .faults
+        .iter()
+        .map(|i| json!({"fault": i.fault.to_string(), "from_s": i.from_s, "to_s": i.to_s}))
+        .collect();
+    let mut truth = json!({"trajectory": trajectory, "regions": regions, "path_m": recording.truth.path_m});
+    if !faults.is_empty() {
+        truth["faults"] = json!(faults);
+    }
     (truth, json!(questions))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{LaserModel, Scenario};
+    use crate::{LaserModel, Scenario};
     use toponym_proto::record::RecordReader;
 
     fn recording() -> Recording {

@@ -1,7 +1,7 @@
 //! From contours to walls: where two spaces' portals face each other, a doorway stands open.
 
 use super::floorplan::{Edge, FloorPlan};
-use super::geom::{Area, Point, Segment, distance_m, uncovered};
+use crate::geom::{Area, Point, Segment, distance_m, uncovered};
 use std::collections::BTreeMap;
 
 /// Portals further apart do not face each other through one wall.
@@ -13,7 +13,7 @@ const PARALLEL: f64 = 0.94;
 
 /// The walls of a plan.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Walls {
+pub(crate) struct Walls {
     /// Each with whether it is a window.
     pub lines: Vec<(Segment, bool)>,
     /// The floor in the doorways, through the walls' thickness.
@@ -33,7 +33,7 @@ struct Portal {
 
 /// Puts up the walls. A portal stands open as far as one of its target faces it; where none does
 /// (an outer door, a slip of the drawing), it is a shut door, which is a wall.
-pub(super) fn walls(plan: &FloorPlan) -> Walls {
+pub(crate) fn walls(plan: &FloorPlan) -> Walls {
     let index: BTreeMap<&str, usize> =
         plan.spaces.iter().zip(0..).map(|(s, k)| (s.name.as_str(), k)).collect();
     let mut built = Walls { doors: vec![0; plan.spaces.len()], ..Walls::default() };

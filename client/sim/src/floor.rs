@@ -1,6 +1,6 @@
 //! The free floor as a grid: how far the walls are, and ways that keep off them.
 
-use super::geom::{Area, Point, Segment, crossing_x, distance_m};
+use crate::geom::{Area, Point, Segment, crossing_x, distance_m};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
@@ -22,7 +22,7 @@ const AROUND: [(i64, i64); 8] = [(1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 
 
 /// Free floor.
 #[derive(Clone, Debug)]
-pub(super) struct Floor {
+pub(crate) struct Floor {
     origin: Point,
     columns: usize,
     rows: usize,
@@ -32,7 +32,7 @@ pub(super) struct Floor {
 
 impl Floor {
     /// The floor inside any of the areas, away from all walls.
-    pub(super) fn new(areas: &[Area], walls: &[Segment]) -> Self {
+    pub(crate) fn new(areas: &[Area], walls: &[Segment]) -> Self {
         let boxes = areas.iter().map(Area::bounds);
         let [low, high] = boxes.fold([[f64::INFINITY; 2], [f64::NEG_INFINITY; 2]], |[l, h], [a, b]| {
             [[l[0].min(a[0]), l[1].min(a[1])], [h[0].max(b[0]), h[1].max(b[1])]]
@@ -52,7 +52,7 @@ impl Floor {
     }
 
     /// Cells whose middles lie in an area.
-    pub(super) fn cells_in(&self, area: &Area) -> Vec<usize> {
+    pub(crate) fn cells_in(&self, area: &Area) -> Vec<usize> {
         let [low, high] = area.bounds();
         let (first, last) = (self.index(1, low[1] - CELL_M), self.index(1, high[1] + CELL_M));
         let mut cells = Vec::new();
@@ -98,13 +98,13 @@ impl Floor {
     }
 
     /// The middle of a cell.
-    pub(super) fn middle(&self, cell: usize) -> Point {
+    pub(crate) fn middle(&self, cell: usize) -> Point {
         let at = |k: usize, n: usize| self.origin[k] + (n as f64 + 0.5) * CELL_M;
         [at(0, cell % self.columns), at(1, cell / self.columns)]
     }
 
     /// Distance to the nearest wall, up to a metre, to the grid's accuracy.
-    pub(super) fn clearance_m(&self, p: Point) -> f64 {
+    pub(crate) fn clearance_m(&self, p: Point) -> f64 {
         self.clearance_m[self.cell(p)]
     }
 
@@ -126,7 +126,7 @@ impl Floor {
 
     /// The largest part of the floor that a robot can drive all over: per cell, whether it is
     /// part of it.
-    pub(super) fn largest_part(&self) -> Vec<bool> {
+    pub(crate) fn largest_part(&self) -> Vec<bool> {
         let n = self.clearance_m.len();
         let (mut part, mut sizes) = (vec![usize::MAX; n], Vec::new());
         for seed in 0..n {
@@ -152,7 +152,7 @@ impl Floor {
     }
 
     /// A short walk that keeps off walls where there is room; none if there is no way.
-    pub(super) fn route(&self, from: Point, to: Point) -> Option<Vec<Point>> {
+    pub(crate) fn route(&self, from: Point, to: Point) -> Option<Vec<Point>> {
         let cells = self.search(self.cell(from), self.cell(to))?;
         let mut route = vec![from];
         route.extend(self.straightened(&cells).into_iter().map(|cell| self.middle(cell)));
@@ -227,7 +227,7 @@ impl Floor {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::geom::Rect;
+    use crate::geom::Rect;
 
     /// Two rooms of 4 m by 4 m with a door of the given width in the wall between them.
     fn two_rooms(door_m: f64) -> (Floor, Vec<Segment>) {

@@ -2,12 +2,12 @@
 
 use super::building::{OfficeStyle, demo_building, random_office};
 use super::floorplan::FloorPlan;
-use super::geom::Point;
 use super::guide::GuideStyle;
 use super::random::Draw;
 use super::storey::Storey;
 use super::world::{RoomKind, World};
 use super::{Scenario, SimError};
+use crate::geom::Point;
 
 impl Scenario {
     /// The tour of the demo: round the building, back through the first lobby, and to the gym
@@ -103,10 +103,10 @@ fn centre(world: &World) -> Point {
 
 #[cfg(test)]
 mod tests {
-    use super::super::laser::LaserModel;
-    use super::super::robot::Wheels;
-    use super::super::storey::tests::ROW;
     use super::*;
+    use crate::laser::LaserModel;
+    use crate::storey::tests::ROW;
+    use crate::wheels::Wheels;
     use std::path::Path;
     use toponym_proto::{Limits, Message};
 

@@ -2,7 +2,7 @@
 
 use super::cast::{Buckets, Strike};
 use super::floor::Floor;
-use super::geom::{Area, Point, Rect, Segment, distance_m, outline};
+use crate::geom::{Area, Point, Rect, Segment, distance_m, outline};
 
 /// Body radius and a margin: a way keeps this far from every wall.
 const CLEARANCE_M: f64 = 0.32;
@@ -44,6 +44,8 @@ pub struct Plan {
     pub furniture: Vec<Segment>,
     /// Name, area, kind, and where a visitor stops.
     pub rooms: Vec<(String, Rect, RoomKind, Point)>,
+    /// Floor on which lasers see nothing.
+    pub dark: Vec<Rect>,
     /// More points to walk by: both sides of each door, corridors' middles.
     pub waypoints: Vec<Point>,
 }
@@ -72,6 +74,12 @@ impl Plan {
             let f = k as f64 / steps;
             self.waypoints.push([from[0] + f * (to[0] - from[0]), from[1] + f * (to[1] - from[1])]);
         }
+    }
+
+    /// Floor on which a laser sees nothing, nor through it: sunlight, fog. It is floor only where
+    /// something else makes it so.
+    pub fn dark(&mut self, area: Rect) {
+        self.dark.push(area);
     }
 
     /// A door opening across the wall between two facing points of neighbouring rooms.
@@ -116,7 +124,9 @@ impl Plan {
             .collect();
         waypoints.extend(self.waypoints);
         let ways = Ways::Seen(find_ways(&waypoints, &walls));
-        World::new(walls, rooms, waypoints, ways)
+        let mut world = World::new(walls, rooms, waypoints, ways);
+        world.dark = self.dark;
+        world
     }
 }
 
@@ -134,7 +144,7 @@ pub enum Surface {
 
 /// How one gets from waypoint to waypoint.
 #[derive(Clone, Debug)]
-pub(super) enum Ways {
+pub(crate) enum Ways {
     /// Straight between waypoints; per waypoint those in reach, with their distances in metres.
     Seen(Vec<Vec<(usize, f64)>>),
     /// Anywhere over the free floor.
@@ -152,15 +162,17 @@ pub struct World {
     pub rooms: Vec<Room>,
     /// Points to walk by.
     pub waypoints: Vec<Point>,
+    /// Floor on which lasers see nothing.
+    pub dark: Vec<Rect>,
     ways: Ways,
     buckets: Buckets,
 }
 
 impl World {
     /// A floor of plain walls.
-    pub(super) fn new(walls: Vec<Segment>, rooms: Vec<Room>, waypoints: Vec<Point>, ways: Ways) -> Self {
+    pub(crate) fn new(walls: Vec<Segment>, rooms: Vec<Room>, waypoints: Vec<Point>, ways: Ways) -> Self {
         let buckets = Buckets::new(&walls);
-        Self { walls, surfaces: Vec::new(), rooms, waypoints, ways, buckets }
+        Self { walls, surfaces: Vec::new(), rooms, waypoints, dark: Vec::new(), ways, buckets }
     }
 
     /// Range of a ray; none if nothing stops it within `range_max_m`.
@@ -170,7 +182,19 @@ impl World {
 
     /// Where a ray meets the first wall; none if nothing stops it within `range_max_m`.
     pub fn strike(&self, origin: Point, bearing_rad: f64, range_max_m: f64) -> Option<Strike> {
-        self.buckets.cast(&self.walls, origin, bearing_rad, range_max_m)
+        let strike = self.buckets.cast(&self.walls, origin, bearing_rad, range_max_m)?;
+        (strike.range_m < self.dark_from_m(origin, bearing_rad)).then_some(strike)
+    }
+
+    /// Whether a point lies on floor on which lasers see nothing.
+    pub fn is_dark(&self, p: Point) -> bool {
+        self.dark.iter().any(|d| d.contains(p, 0.0))
+    }
+
+    /// How far a ray goes before it comes upon dark floor, from beyond which nothing comes back.
+    pub fn dark_from_m(&self, origin: Point, bearing_rad: f64) -> f64 {
+        let (s, c) = bearing_rad.sin_cos();
+        self.dark.iter().filter_map(|d| d.entry_m(origin, [c, s])).fold(f64::INFINITY, f64::min)
     }
 
     /// Distance of a point to the nearest wall, metres.
@@ -179,7 +203,7 @@ impl World {
     }
 
     /// The free floor, where ways are not bound to waypoints.
-    pub(super) fn floor(&self) -> Option<&Floor> {
+    pub(crate) fn floor(&self) -> Option<&Floor> {
         match &self.ways {
             Ways::Seen(_) => None,
             Ways::Open(floor) => Some(floor),
@@ -279,6 +303,19 @@ mod tests {
         assert_eq!(cast(-3.0, 6.0, 90.0), None, "outside, looking away");
         let outside = cast(-3.0, 1.0, 0.0).unwrap();
         assert!((outside - 3.0).abs() < 1e-9, "outside, looking in");
+    }
+
+    #[test]
+    fn nothing_comes_back_from_beyond_dark_floor() {
+        let mut plan = Plan::default();
+        plan.room("a", Rect::new([0.0, 0.0], [8.0, 4.0]));
+        plan.dark(Rect::new([4.0, 1.0], [5.0, 3.0]));
+        let world = plan.build();
+        assert_eq!(world.cast([1.0, 2.0], 0.0, 30.0), None);
+        assert_eq!(world.cast([4.5, 2.0], 1.0, 30.0), None, "from within");
+        assert_eq!(world.cast([1.0, 0.5], 0.0, 30.0), Some(7.0), "beside it");
+        assert_eq!(world.cast([3.0, 2.0], std::f64::consts::PI, 30.0), Some(3.0), "away from it");
+        assert!(world.is_dark([4.5, 2.0]) && !world.is_dark([3.9, 2.0]));
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Buildings of our own making: one fixed, and any number drawn from a seed.
 
-use super::geom::{Point, Rect, Segment, distance_m};
 use super::random::Draw;
 use super::world::{Plan, World};
+use crate::geom::{Point, Rect, Segment, distance_m};
 
 /// Thickness of a wall.
 const WALL_M: f64 = 0.2;

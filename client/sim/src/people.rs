@@ -1,10 +1,10 @@
 //! People walking about: the guide ahead of the robot, others on errands of their own.
 
 use super::SimError;
-use super::geom::{Point, distance_m};
 use super::random::Draw;
 use super::robot::Drive;
 use super::world::World;
+use crate::geom::{Point, distance_m};
 
 /// Time step of the walks, seconds.
 const STEP_S: f64 = 0.1;
@@ -209,7 +209,7 @@ fn strolled(round: &Trail, steps: usize, draw: &mut Draw) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::storey::tests::two_rooms;
+    use crate::storey::tests::two_rooms;
     use toponym_proto::Pose;
 
     fn ahead(length_m: f64) -> Drive {

@@ -2,14 +2,15 @@
 
 use super::SimError;
 use super::follow::Track;
-use super::geom::{Point, between, blend, compose, distance_m, wrap};
 use super::random::Draw;
+use super::wheels::Wheels;
 use super::world::World;
+use crate::geom::{Point, between, blend, compose, distance_m, wrap};
 use std::f64::consts::FRAC_PI_2;
 use toponym_proto::Pose;
 
-/// Time step of the motion, seconds.
-pub(super) const STEP_S: f64 = 0.02;
+/// Time step of a [`Drive`], seconds.
+pub const STEP_S: f64 = 0.02;
 /// A waypoint counts as passed from here, metres.
 const PASSED_M: f64 = 0.25;
 
@@ -29,63 +30,6 @@ pub struct Motion {
 impl Default for Motion {
     fn default() -> Self {
         Self { speed_mps: (0.5, 1.0), turn_max_radps: 0.9, accel_mps2: 0.8, rest_s: 1.5 }
-    }
-}
-
-/// What wheel odometry gets wrong. Variances add up along the path.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Wheels {
-    /// Relative error of every distance: .01 measures 1 % too far.
-    pub scale_error: f64,
-    /// Relative error of every turn.
-    pub turn_error: f64,
-    /// Turn imagined per metre driven.
-    pub yaw_bias_rad_per_m: f64,
-    /// Standard deviation of the distance after one metre.
-    pub noise_m: f64,
-    /// Standard deviation of the heading after one metre.
-    pub yaw_noise_rad: f64,
-    /// Standard deviation of the heading after one radian turned.
-    pub turn_noise_rad: f64,
-}
-
-impl Default for Wheels {
-    fn default() -> Self {
-        Self {
-            scale_error: 0.01,
-            turn_error: 0.01,
-            yaw_bias_rad_per_m: 0.002,
-            noise_m: 0.01,
-            yaw_noise_rad: 0.012,
-            turn_noise_rad: 0.02,
-        }
-    }
-}
-
-impl Wheels {
-    /// Wheels as bad as any that mapping has to cope with: after a metre off by 5 % and 2°, after a
-    /// radian by 5 %, and always a quarter of a degree per metre to the left.
-    pub fn rough() -> Self {
-        Self {
-            scale_error: 0.0,
-            turn_error: 0.0,
-            yaw_bias_rad_per_m: 0.25_f64.to_radians(),
-            noise_m: 0.05,
-            yaw_noise_rad: 2_f64.to_radians(),
-            turn_noise_rad: 0.05,
-        }
-    }
-
-    /// Wheels that measure exactly.
-    pub fn perfect() -> Self {
-        Self {
-            scale_error: 0.0,
-            turn_error: 0.0,
-            yaw_bias_rad_per_m: 0.0,
-            noise_m: 0.0,
-            yaw_noise_rad: 0.0,
-            turn_noise_rad: 0.0,
-        }
     }
 }
 
@@ -155,6 +99,17 @@ pub fn drive(world: &World, tour: &[usize], motion: &Motion, draw: &mut Draw) ->
         let route = world.route(spot(pair[0])?, spot(pair[1])?);
         legs.push(route.ok_or(SimError::NoWay(pair[0], pair[1]))?);
     }
+    Ok(drive_legs(world, start, &legs, motion, draw))
+}
+
+/// Drives along legs, each from where the last one ends, resting after each.
+pub(crate) fn drive_legs(
+    world: &World,
+    start: Point,
+    legs: &[Vec<Point>],
+    motion: &Motion,
+    draw: &mut Draw,
+) -> Drive {
     let ahead = legs.first().and_then(|l| l.get(1)).copied().unwrap_or([start[0] + 1.0, start[1]]);
     // Parked square to the walls, as robots are.
     let towards = (ahead[1] - start[1]).atan2(ahead[0] - start[0]);
@@ -162,7 +117,7 @@ pub fn drive(world: &World, tour: &[usize], motion: &Motion, draw: &mut Draw) ->
     let mut body = Body { pose: Pose { x_m: start[0], y_m: start[1], yaw_rad }, speed_mps: 0.0 };
     let mut poses = vec![body.pose];
     body.rest(motion.rest_s, &mut poses);
-    for leg in &legs {
+    for leg in legs {
         let cruise_mps = draw.within(motion.speed_mps);
         if let Some(floor) = world.floor() {
             body.follow(&Track::new(floor, leg), cruise_mps, motion, &mut poses);
@@ -174,13 +129,13 @@ pub fn drive(world: &World, tour: &[usize], motion: &Motion, draw: &mut Draw) ->
         }
         body.rest(motion.rest_s, &mut poses);
     }
-    Ok(Drive { poses })
+    Drive { poses }
 }
 
 /// The robot on its way.
-pub(super) struct Body {
-    pub(super) pose: Pose,
-    pub(super) speed_mps: f64,
+pub(crate) struct Body {
+    pub(crate) pose: Pose,
+    pub(crate) speed_mps: f64,
 }
 
 impl Body {
@@ -208,7 +163,7 @@ impl Body {
     }
 
     /// Moves on for one time step.
-    pub(super) fn step(&mut self, wanted_mps: f64, turn_radps: f64, motion: &Motion, poses: &mut Vec<Pose>) {
+    pub(crate) fn step(&mut self, wanted_mps: f64, turn_radps: f64, motion: &Motion, poses: &mut Vec<Pose>) {
         let change = motion.accel_mps2 * STEP_S;
         self.speed_mps += (wanted_mps - self.speed_mps).clamp(-2.0 * change, change);
         let step = Pose { x_m: self.speed_mps * STEP_S, y_m: 0.0, yaw_rad: turn_radps * STEP_S };
@@ -220,12 +175,12 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::{demo_building, random_office};
+    use crate::{demo_building, random_office};
 
     #[test]
     fn the_robot_keeps_clear_of_walls_and_within_its_speed() {
         let motion = Motion::default();
-        for world in [demo_building(), random_office(&crate::sim::OfficeStyle::default(), 3)] {
+        for world in [demo_building(), random_office(&crate::OfficeStyle::default(), 3)] {
             let tour: Vec<usize> = (0..world.rooms.len()).collect();
             let drive = drive(&world, &tour, &motion, &mut Draw::new(1, 0)).unwrap();
             for pose in drive.poses.iter().step_by(10) {

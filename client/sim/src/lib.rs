@@ -2,15 +2,16 @@
 //! the truth beside it. Same scenario, same bytes.
 //!
 //! ```no_run
-//! let recording = toponym::sim::Scenario::demo(1).run()?;
+//! let recording = toponym_sim::Scenario::demo(1).run()?;
 //! println!("{} messages", recording.messages.len());
-//! # Ok::<(), toponym::sim::SimError>(())
+//! # Ok::<(), toponym_sim::SimError>(())
 //! ```
 
 pub mod args;
 mod building;
 mod cast;
 mod doors;
+mod fault;
 mod floor;
 mod floorplan;
 mod follow;
@@ -21,20 +22,24 @@ mod names;
 mod people;
 mod random;
 mod robot;
+mod scenarios;
 mod storey;
-mod tours;
+pub mod tours;
+mod wheels;
 mod world;
 pub mod write;
 
 pub use building::{OfficeStyle, demo_building, random_office};
 pub use cast::Strike;
+pub use fault::{Fault, Incident};
 pub use floorplan::{Edge, FloorPlan, PlanError, Space};
 pub use guide::{GuideStyle, Sentence};
 pub use laser::{LaserModel, Post, Scene, Sweep};
 pub use people::People;
 pub use random::Draw;
-pub use robot::{Drive, Motion, Wheels};
+pub use robot::{Drive, Motion, STEP_S};
 pub use storey::Storey;
+pub use wheels::{Wheels, WheelsPrior};
 pub use world::{Plan, Room, RoomKind, Surface, World};
 
 use geom::Point;
@@ -43,6 +48,8 @@ use toponym_proto::{Clock, End, Header, Message, Odom, Pose, Say, Scan, Setup, S
 
 /// Purpose of the people's draws, far from those of the lasers, which are counted.
 const PEOPLE: u64 = 1000;
+/// Purpose of the draws of when faults happen.
+const FAULTS: u64 = 1001;
 
 /// A scenario that can't be played.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -56,6 +63,15 @@ pub enum SimError {
     /// A floor plan has nothing to tour.
     #[error("a tour needs 2 rooms, the largest part that doors join has {0}: do portals face each other?")]
     TooSmall(usize),
+    /// A fault of that name is not known.
+    #[error("{0:?} is no fault: give slip:DEGREES, slip:METRESm, unsigned or break")]
+    NoSuchFault(String),
+    /// A tour of that name is not known.
+    #[error("there is no tour {0:?}: give one of {1}")]
+    NoSuchTour(String, String),
+    /// A language of that name is not known.
+    #[error("{0:?} is no language: give none, simple, complex or false20")]
+    NoSuchLanguage(String),
     /// Two rooms are not joined by doors.
     #[error("there is no way from room {0} to room {1}")]
     NoWay(usize, usize),
@@ -78,6 +94,8 @@ pub struct Scenario {
     pub lasers: Vec<LaserModel>,
     /// People walking about, the guide among them; 0: they leave no trace in the scans.
     pub people: usize,
+    /// What goes wrong.
+    pub faults: Vec<Fault>,
     /// What the guide says.
     pub guide: GuideStyle,
     /// Robot id in the messages.
@@ -99,6 +117,7 @@ impl Scenario {
             odom_rate_hz: 10.0,
             lasers: vec![LaserModel::default()],
             people: 0,
+            faults: Vec::new(),
             guide: GuideStyle::default(),
             robot: "sim".into(),
             map: "main".into(),
@@ -108,20 +127,40 @@ impl Scenario {
 
     /// Plays the scenario.
     pub fn run(&self) -> Result<Recording, SimError> {
-        let draw = |purpose: u64| Draw::new(self.seed, 16 + purpose);
-        let drive = robot::drive(&self.world, &self.tour, &self.motion, &mut draw(0))?;
-        let odometry = drive.measured(&self.wheels, &mut draw(1));
-        let people = People::walking(&self.world, &drive, self.people, &mut draw(PEOPLE))?;
-        let scene = Scene { world: &self.world, drive: &drive, people: &people };
-        let said = guide::narrate(&self.world, &drive, &self.guide, &mut draw(2));
+        let drive = robot::drive(&self.world, &self.tour, &self.motion, &mut self.draw(0))?;
+        let said = guide::narrate(&self.world, &drive, &self.guide, &mut self.draw(2));
+        let stream = self.stream(&drive)?;
+        let messages = interleave(stream.messages, &said, &self.robot);
+        let truth = Truth {
+            scans: stream.scans,
+            names: self.names(&said),
+            start: drive.at(0.0),
+            path_m: drive.path_m(),
+            faults: stream.incidents,
+        };
+        Ok(Recording { messages, truth })
+    }
+
+    fn draw(&self, purpose: u64) -> Draw {
+        Draw::new(self.seed, 16 + purpose)
+    }
+
+    /// What the robot sends along a drive.
+    pub(crate) fn stream(&self, drive: &Drive) -> Result<Stream, SimError> {
+        let incidents = fault::incidents(&self.faults, drive, &mut self.draw(FAULTS));
+        let odometry = drive.measured(&self.wheels, &mut self.draw(1));
+        let odometry = fault::misread(&incidents, drive, &odometry);
+        let people = People::walking(&self.world, drive, self.people, &mut self.draw(PEOPLE))?;
+        let scene = Scene { world: &self.world, drive, people: &people };
+        let told = |t_s: &f64| !fault::silent(&incidents, *t_s);
         let mut timed = vec![(0.0, self.setup())];
-        for t_s in ticks(drive.duration_s(), self.odom_rate_hz) {
+        for t_s in ticks(drive.duration_s(), self.odom_rate_hz).filter(told) {
             timed.push((t_s, self.odom(t_s, &odometry)));
         }
         let mut scans = Vec::new();
         for (laser, purpose) in self.lasers.iter().zip(3..) {
-            let mut draw = draw(purpose);
-            for t_s in ticks(drive.duration_s() - laser.sweep_s, laser.rate_hz) {
+            let mut draw = self.draw(purpose);
+            for t_s in ticks(drive.duration_s() - laser.sweep_s, laser.rate_hz).filter(told) {
                 // A sweep is sent when it is complete.
                 timed.push((t_s + laser.sweep_s, self.scan(t_s, laser, &scene, &mut draw)));
                 scans.push((Stamp::from_seconds(t_s), drive.at(t_s)));
@@ -132,9 +171,7 @@ impl Scenario {
         let mut messages: Vec<Message> = timed.into_iter().map(|(_, message)| message).collect();
         messages.push(Message::End(End { header: self.header(drive.duration_s()) }));
         number(&mut messages);
-        let messages = self.interleave(messages, &said);
-        let truth = Truth { scans, names: self.names(&said), start: drive.at(0.0), path_m: drive.path_m() };
-        Ok(Recording { messages, truth })
+        Ok(Stream { messages, odometry, scans, incidents })
     }
 
     fn header(&self, t_s: f64) -> Header {
@@ -163,41 +200,51 @@ impl Scenario {
         })
     }
 
-    fn interleave(&self, stream: Vec<Message>, said: &[Sentence]) -> Vec<Message> {
-        let mut messages = Vec::with_capacity(stream.len() + said.len());
-        let mut waiting = Sentences::default();
-        for (k, sentence) in said.iter().enumerate() {
-            waiting.push(self.say(k, sentence), Stamp::default());
-        }
-        for message in stream {
-            while let Some(say) = waiting.pop_before(order_stamp(&message)) {
-                messages.push(Message::Say(say));
-            }
-            messages.push(message);
-        }
-        messages
-    }
-
-    fn say(&self, k: usize, sentence: &Sentence) -> Say {
-        let began = Stamp::from_seconds(sentence.began_s);
-        Say {
-            id: ulid::Ulid::from_parts((began.ns / 1_000_000) as u64, k as u128).to_string(),
-            robot: Some(self.robot.clone()),
-            text: sentence.text.clone(),
-            alternatives: Vec::new(),
-            lang: Some("en".into()),
-            speaker: Some("guide".into()),
-            began: Some(began),
-            ended: Some(Stamp::from_seconds(sentence.ended_s)),
-            retracts: None,
-        }
-    }
-
     /// The rooms that were spoken of.
     fn names(&self, said: &[Sentence]) -> Vec<(String, Vec<Point>)> {
         let spoken = |name: &str| !name.is_empty() && said.iter().any(|s| s.text.contains(name));
         let rooms = self.world.rooms.iter().filter(|r| spoken(&r.name));
         rooms.map(|r| (r.name.clone(), r.area.corners.clone())).collect()
+    }
+}
+
+/// What a robot sent along a drive.
+pub(crate) struct Stream {
+    pub(crate) messages: Vec<Message>,
+    /// As the wheels told it, faults and all.
+    pub(crate) odometry: Drive,
+    pub(crate) scans: Vec<(Stamp, Pose)>,
+    pub(crate) incidents: Vec<Incident>,
+}
+
+/// A robot's stream with what was said to it, each sentence before what came later.
+pub(crate) fn interleave(stream: Vec<Message>, said: &[Sentence], robot: &str) -> Vec<Message> {
+    let mut messages = Vec::with_capacity(stream.len() + said.len());
+    let mut waiting = Sentences::default();
+    for (k, sentence) in said.iter().enumerate() {
+        waiting.push(say(k, sentence, robot), Stamp::default());
+    }
+    for message in stream {
+        while let Some(say) = waiting.pop_before(order_stamp(&message)) {
+            messages.push(Message::Say(say));
+        }
+        messages.push(message);
+    }
+    messages
+}
+
+fn say(k: usize, sentence: &Sentence, robot: &str) -> Say {
+    let began = Stamp::from_seconds(sentence.began_s);
+    Say {
+        id: ulid::Ulid::from_parts((began.ns / 1_000_000) as u64, k as u128).to_string(),
+        robot: Some(robot.to_owned()),
+        text: sentence.text.clone(),
+        alternatives: Vec::new(),
+        lang: Some("en".into()),
+        speaker: Some("guide".into()),
+        began: Some(began),
+        ended: Some(Stamp::from_seconds(sentence.ended_s)),
+        retracts: None,
     }
 }
 
@@ -221,6 +268,8 @@ pub struct Truth {
     pub start: Pose,
     /// Way driven, metres.
     pub path_m: f64,
+    /// What went wrong, and when.
+    pub faults: Vec<Incident>,
 }
 
 fn ticks(duration_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
@@ -228,7 +277,7 @@ fn ticks(duration_s: f64, rate_hz: f64) -> impl Iterator<Item = f64> {
     (0..n).map(move |k| k as f64 / rate_hz)
 }
 
-fn header_mut(message: &mut Message) -> Option<&mut Header> {
+pub(crate) fn header_mut(message: &mut Message) -> Option<&mut Header> {
     match message {
         Message::Setup(m) => Some(&mut m.header),
         Message::Odom(m) => Some(&mut m.header),

@@ -1,11 +1,12 @@
 //! A laser range finder.
 
-use super::geom::apply;
 use super::people::People;
 use super::random::Draw;
 use super::robot::Drive;
 use super::world::{Surface, World};
+use crate::geom::apply;
 use std::f64::consts::{PI, TAU};
+use toponym_proto::Pose;
 use toponym_proto::stream::Laser;
 
 /// Dark walls are seen up to here.
@@ -135,6 +136,7 @@ impl LaserModel {
         let angle_increment_rad = self.fov_rad / self.gaps(beams);
         let time_increment_s = self.sweep_s / self.gaps(beams);
         let start = scene.drive.at(t_s);
+        let blind = scene.world.is_dark([start.x_m, start.y_m]);
         let near = scene.people.near([start.x_m, start.y_m], self.mount.range_max_m, t_s);
         let ranges_m = (0..beams)
             .map(|k| {
@@ -144,6 +146,7 @@ impl LaserModel {
                 // Drawn for every ray, seen or not: one wall more must not shift the others' noise.
                 let (noise_m, dropped) = (self.noise_m * draw.normal(), draw.chance(self.dropouts));
                 match range_m {
+                    _ if blind => f32::INFINITY,
                     _ if dropped => f32::NAN,
                     None => f32::INFINITY,
                     Some(range_m) => (((range_m + noise_m).max(0.0) * 1e3).round() / 1e3) as f32,
@@ -151,6 +154,19 @@ impl LaserModel {
             })
             .collect();
         Sweep { ranges_m, angle_increment_rad, time_increment_s }
+    }
+
+    /// True ranges of a sweep at once from a place of the body, without people and noise; none
+    /// where nothing comes back.
+    pub fn ranges_m(&self, world: &World, world_from_body: &Pose) -> Vec<Option<f64>> {
+        let beams = self.beams.0;
+        if world.is_dark([world_from_body.x_m, world_from_body.y_m]) {
+            return vec![None; beams];
+        }
+        let drive = Drive { poses: vec![*world_from_body] };
+        let scene = Scene { world, drive: &drive, people: &People::default() };
+        let bearing = |k: usize| self.angle_min_rad() + k as f64 * self.fov_rad / self.gaps(beams);
+        (0..beams).map(|k| self.range_m(&scene, &[], 0.0, bearing(k))).collect()
     }
 
     /// True range of one ray; none if nothing sends it back.
@@ -164,7 +180,8 @@ impl LaserModel {
         let direction = body.yaw_rad + self.mount.yaw_rad + handed * bearing;
         let wall = scene.world.strike(origin, direction, self.mount.range_max_m);
         let leg_m = scene.people.cast(near, t_s, origin, direction);
-        match (wall, leg_m.filter(|&m| m < self.mount.range_max_m)) {
+        let reach_m = self.mount.range_max_m.min(scene.world.dark_from_m(origin, direction));
+        match (wall, leg_m.filter(|&m| m < reach_m)) {
             (Some(wall), Some(leg_m)) if leg_m < wall.range_m => Some(leg_m),
             (None, leg_m) => leg_m,
             (Some(wall), _) => {
@@ -191,10 +208,9 @@ impl Post {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::geom::{Rect, compose};
-    use crate::sim::world::Plan;
+    use crate::geom::{Rect, compose};
+    use crate::world::Plan;
     use std::collections::BTreeSet;
-    use toponym_proto::Pose;
 
     fn room() -> World {
         let mut plan = Plan::default();
@@ -323,6 +339,20 @@ mod tests {
                 assert!(on_post || !within || !range_m.is_finite(), "{range_m} m through the post");
             }
         }
+    }
+
+    #[test]
+    fn on_dark_floor_there_is_nothing_to_see_not_even_dropouts() {
+        let mut world = room();
+        world.dark = vec![Rect::new([0.0, 0.0], [2.0, 4.0])];
+        let laser = LaserModel { dropouts: 0.5, ..LaserModel::default() };
+        let look = |x_m| swept(&laser, &world, &standing(x_m, 2.0, 0.0), &mut Draw::new(1, 0));
+        // The laser itself, 0.2 m ahead, is out of the dark already.
+        assert!(look(1.9).iter().all(|r| *r == f32::INFINITY));
+        assert!(look(2.1).iter().any(|r| r.is_finite()));
+        let at = |x_m| laser.ranges_m(&world, &Pose { x_m, y_m: 2.0, yaw_rad: 0.0 });
+        assert!(at(1.9).iter().all(Option::is_none));
+        assert_eq!(at(2.1)[90].map(|r| (r * 1e6).round() / 1e6), Some(3.7));
     }
 
     #[test]

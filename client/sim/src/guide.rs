@@ -171,8 +171,8 @@ fn visits(world: &World, drive: &Drive) -> Vec<Visit> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::demo_building;
-    use crate::sim::robot::{Motion, drive};
+    use crate::demo_building;
+    use crate::robot::{Motion, drive};
 
     fn told(style: &GuideStyle) -> (World, Drive, Vec<Sentence>) {
         let world = demo_building();

@@ -1,8 +1,8 @@
 //! Driving along a path in curves, as robots do, rather than from corner to corner.
 
 use super::floor::Floor;
-use super::geom::{Point, distance_m, wrap};
 use super::robot::{Body, Motion, STEP_S};
+use crate::geom::{Point, distance_m, wrap};
 use toponym_proto::Pose;
 
 /// Distance of the path's points.
@@ -17,14 +17,14 @@ const THERE_M: f64 = 0.06;
 const STUCK_S_PER_M: f64 = 60.0;
 
 /// A path over the free floor.
-pub(super) struct Track<'a> {
+pub(crate) struct Track<'a> {
     floor: &'a Floor,
     points: Vec<Point>,
 }
 
 impl<'a> Track<'a> {
     /// The path along the corners of a route.
-    pub(super) fn new(floor: &'a Floor, route: &[Point]) -> Self {
+    pub(crate) fn new(floor: &'a Floor, route: &[Point]) -> Self {
         let mut points: Vec<Point> = route.first().copied().into_iter().collect();
         for leg in route.windows(2) {
             let steps = (distance_m(leg[0], leg[1]) / POINT_M).ceil();
@@ -39,7 +39,7 @@ impl<'a> Track<'a> {
 
 impl Body {
     /// Drives along a path and stops at its end.
-    pub(super) fn follow(
+    pub(crate) fn follow(
         &mut self,
         track: &Track<'_>,
         cruise_mps: f64,
@@ -75,7 +75,7 @@ impl Body {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::sim::geom::{Area, Rect, Segment};
+    use crate::geom::{Area, Rect, Segment};
 
     #[test]
     fn the_robot_stays_on_its_path_and_stops_at_its_end() {
