@@ -20,6 +20,7 @@ mod laser;
 mod names;
 mod people;
 mod random;
+pub mod reference;
 mod robot;
 mod storey;
 mod tours;

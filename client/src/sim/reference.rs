@@ -1,0 +1,243 @@
+//! What an observer may believe who knows the building, the simulator's noise, and a list of
+//! hypotheses about where the robot is: the exact odds that a mapping server's are held against.
+//!
+//! The posterior over hypotheses h at a time t, from what came in up to t:
+//!
+//! ```text
+//! log w_h(t) = log prior_h
+//!            + Σ over dark stretches that ended   log N(log(m⁻¹ ∘ rel_h); 0, Σ)      wheels
+//!            + Σ over scans in the light          log p(scan | T_h x) − log p(scan | x)   laser
+//!            + Σ over sentences                   log p(name | T_h at)                words
+//! ```
+//!
+//! with x the true pose, world frame, T_h the hypothesis' `world_from_true` at that time, m the
+//! motion that the wheels tell of and rel_h the one that the hypothesis asks for. Nothing here is
+//! shared with a mapping server: an error of its filter can't hide in its own yardstick.
+//!
+//! What is approximate:
+//!
+//! - motion in the dark is linearised: steps are small, and its heading must be known to some tenths
+//!   of a radian at the stretch's end, as the ways there become banana-shaped beyond;
+//! - the laser is taken to give every pose in the light exactly, and a hypothesis to hold it rigidly
+//!   at `T_h x`: rooms whose walls differ by less than the laser's noise are not fitted anew;
+//! - how far and how much the robot turned in the dark, and with it how large the noise is, comes
+//!   from the truth, not from the wheels' own noisy steps;
+//! - a ray that a hypothesis can't explain costs a bounded amount;
+//! - not every scan is used, see [`Seen::stride_s`].
+
+mod plane;
+mod rays;
+mod wheels;
+mod words;
+
+#[cfg(test)]
+mod tests;
+
+use super::geom::{Point, compose};
+use super::laser::LaserModel;
+use super::robot::{Drive, STEP_S, Wheels};
+use super::world::World;
+use toponym_proto::{Message, Pose};
+
+/// Times closer than this are the same: stamps are rounded, and 3 · 0.1 is not 0.3.
+const HAIR_S: f64 = 1e-6;
+
+/// A world frame that a hypothesis holds the robot to be moved to, from some time on.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Piece {
+    /// From when on, seconds from the start of the drive: later than a [`Stretch`] begins, and not
+    /// later than it ends.
+    pub from_s: f64,
+    /// The robot is at `world_from_true ∘ x_true`.
+    pub world_from_true: Pose,
+}
+
+/// A belief about where the robot is.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Hypothesis {
+    /// For people.
+    pub name: String,
+    /// In order of time; before the first one, the robot is where it really is.
+    pub pieces: Vec<Piece>,
+}
+
+/// What is known of the wheels' systematic errors beforehand: standard deviations about 0.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct WheelsPrior {
+    /// Of [`Wheels::scale_error`].
+    pub scale_error: f64,
+    /// Of [`Wheels::turn_error`].
+    pub turn_error: f64,
+    /// Of [`Wheels::yaw_bias_rad_per_m`].
+    pub yaw_bias_rad_per_m: f64,
+}
+
+/// A time in which the laser tells nothing of the motion.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// Last time in the light before it, seconds from the start of the drive.
+    pub from_s: f64,
+    /// First time in the light after it.
+    pub to_s: f64,
+    /// The wheels tell nothing either: the robot was off, and may have been carried.
+    pub carried: bool,
+}
+
+/// A sentence that says what the place is called where the robot is.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Claim {
+    /// When, seconds from the start of the drive.
+    pub said_s: f64,
+    /// The name.
+    pub name: String,
+    /// Which place was meant, world frame.
+    pub at: Point,
+}
+
+/// Everything that came in, and the simulator's settings behind it.
+#[derive(Clone, Copy, Debug)]
+pub struct Seen<'a> {
+    /// The building.
+    pub world: &'a World,
+    /// Where the robot really went.
+    pub drive: &'a Drive,
+    /// The same as its wheels measured it.
+    pub odometry: &'a Drive,
+    /// The wheels' noise; their systematic errors are not looked at.
+    pub wheels: &'a Wheels,
+    /// What is known of these.
+    pub prior: &'a WheelsPrior,
+    /// When it was dark, in order of time, apart from each other.
+    pub dark: &'a [Stretch],
+    /// The robot's lasers.
+    pub lasers: &'a [LaserModel],
+    /// Its messages; only scans matter.
+    pub stream: &'a [Message],
+    /// Of each laser, scans closer to each other than this are left out, seconds: they cost time
+    /// and say the same.
+    pub stride_s: f64,
+    /// What people said.
+    pub said: &'a [Claim],
+    /// Share of false sentences.
+    pub epsilon: f64,
+    /// Number of names that a false sentence draws from.
+    pub vocabulary: usize,
+}
+
+/// What speaks for a hypothesis against the truth: log likelihood ratios.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Terms {
+    /// Of the motion in the dark.
+    pub wheels: f64,
+    /// Of the scans in the light.
+    pub laser: f64,
+    /// Of the sentences.
+    pub words: f64,
+}
+
+impl Terms {
+    fn sum(&self) -> f64 {
+        self.wheels + self.laser + self.words
+    }
+}
+
+/// The belief at a time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Posterior {
+    /// Seconds from the start of the drive.
+    pub at_s: f64,
+    /// Probability of each hypothesis; they add up to 1.
+    pub p: Vec<f64>,
+    /// What decided, for each hypothesis.
+    pub terms: Vec<Terms>,
+}
+
+/// A hypothesis that can't be weighed.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum ReferenceError {
+    /// It moves the robot where the laser would have seen it.
+    #[error("{hypothesis}: moved at {from_s} s, when it is neither dark nor carried")]
+    LitJump {
+        /// Its name.
+        hypothesis: String,
+        /// When it begins to hold the robot elsewhere.
+        from_s: f64,
+    },
+}
+
+/// The posterior over hypotheses at each of the times `at_s`. `prior` has a weight for each
+/// hypothesis; missing ones are 1.
+///
+/// # Errors
+/// If a hypothesis moves the robot outside all dark stretches.
+pub fn posterior(
+    seen: &Seen<'_>,
+    hypotheses: &[Hypothesis],
+    prior: &[f64],
+    at_s: &[f64],
+) -> Result<Vec<Posterior>, ReferenceError> {
+    for hypothesis in hypotheses {
+        hypothesis.check(seen.dark)?;
+    }
+    let told: Vec<_> = hypotheses.iter().map(|h| (rays::ratios(seen, h), words::ratios(seen, h))).collect();
+    let at = |&t_s: &f64| {
+        let links = wheels::links(seen, t_s);
+        let truth = links.log_density(seen.drive, &Hypothesis::default());
+        let weigh = |(h, (laser, words)): (&Hypothesis, &(Vec<_>, Vec<_>))| Terms {
+            // The truth itself is no different from the truth, whatever the rounding.
+            wheels: if h.pieces.is_empty() { 0.0 } else { links.log_density(seen.drive, h) - truth },
+            laser: sum_up_to(t_s, laser),
+            words: sum_up_to(t_s, words),
+        };
+        let terms: Vec<Terms> = hypotheses.iter().zip(&told).map(weigh).collect();
+        Posterior { at_s: t_s, p: normalised(&terms, prior), terms }
+    };
+    Ok(at_s.iter().map(at).collect())
+}
+
+impl Hypothesis {
+    /// `world_from_true` at a time.
+    pub fn world_from_true(&self, t_s: f64) -> Pose {
+        let begun = self.pieces.iter().rev().find(|p| p.from_s <= t_s);
+        begun.map(|p| p.world_from_true).unwrap_or_default()
+    }
+
+    /// Where it holds the robot to be, which really is where the drive says.
+    fn pose(&self, drive: &Drive, t_s: f64) -> Pose {
+        compose(&self.world_from_true(t_s), &drive.at(t_s))
+    }
+
+    fn check(&self, dark: &[Stretch]) -> Result<(), ReferenceError> {
+        let hidden = |p: &&Piece| dark.iter().any(|d| d.from_s < p.from_s && p.from_s <= d.to_s);
+        match self.pieces.iter().find(|p| !hidden(p)) {
+            Some(p) => Err(ReferenceError::LitJump { hypothesis: self.name.clone(), from_s: p.from_s }),
+            None => Ok(()),
+        }
+    }
+}
+
+impl Stretch {
+    /// Time steps of the drive, from the first on and before the last, that it touches.
+    fn steps(&self) -> std::ops::Range<usize> {
+        let step = |t_s: f64| t_s.max(0.0) / STEP_S;
+        step(self.from_s + HAIR_S).floor() as usize..step(self.to_s - HAIR_S).ceil() as usize
+    }
+
+    /// Whether the laser sees nothing at a time.
+    fn hides(&self, t_s: f64) -> bool {
+        self.from_s + HAIR_S < t_s && t_s < self.to_s - HAIR_S
+    }
+}
+
+fn sum_up_to(t_s: f64, timed: &[(f64, f64)]) -> f64 {
+    timed.iter().filter(|(at_s, _)| *at_s <= t_s + HAIR_S).fold(0.0, |sum, (_, log_ratio)| sum + log_ratio)
+}
+
+/// Probabilities ∝ prior · exp(sum of terms).
+fn normalised(terms: &[Terms], prior: &[f64]) -> Vec<f64> {
+    let weights = prior.iter().copied().chain(std::iter::repeat(1.0));
+    let logs: Vec<f64> = terms.iter().zip(weights).map(|(t, w)| w.ln() + t.sum()).collect();
+    let most = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+    let total: f64 = logs.iter().map(|l| (l - most).exp()).sum();
+    logs.iter().map(|l| (l - most).exp() / total).collect()
+}
