@@ -22,9 +22,11 @@
 //!   at `T_h x`: rooms whose walls differ by less than the laser's noise are not fitted anew;
 //! - how far and how much the robot turned in the dark, and with it how large the noise is, comes
 //!   from the truth, not from the wheels' own noisy steps;
+//! - wheels are without faults: a slip in the dark is taken for noise;
 //! - a ray that a hypothesis can't explain costs a bounded amount;
 //! - not every scan is used, see [`Seen::stride_s`].
 
+mod given;
 mod plane;
 mod rays;
 mod wheels;
@@ -33,65 +35,24 @@ mod words;
 #[cfg(test)]
 mod tests;
 
-use super::geom::{Point, compose};
-use super::laser::LaserModel;
-use super::robot::{Drive, STEP_S, Wheels};
-use super::world::World;
+pub use given::{Claim, Hypothesis, Piece, Said, WheelsPrior};
+
+use super::robot::STEP_S;
+use super::{Drive, LaserModel, World};
 use toponym_proto::{Message, Pose};
 
 /// Times closer than this are the same: stamps are rounded, and 3 · 0.1 is not 0.3.
 const HAIR_S: f64 = 1e-6;
 
-/// A world frame that a hypothesis holds the robot to be moved to, from some time on.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Piece {
-    /// From when on, seconds from the start of the drive: later than a [`Stretch`] begins, and not
-    /// later than it ends.
-    pub from_s: f64,
-    /// The robot is at `world_from_true ∘ x_true`.
-    pub world_from_true: Pose,
-}
-
-/// A belief about where the robot is.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Hypothesis {
-    /// For people.
-    pub name: String,
-    /// In order of time; before the first one, the robot is where it really is.
-    pub pieces: Vec<Piece>,
-}
-
-/// What is known of the wheels' systematic errors beforehand: standard deviations about 0.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct WheelsPrior {
-    /// Of [`Wheels::scale_error`].
-    pub scale_error: f64,
-    /// Of [`Wheels::turn_error`].
-    pub turn_error: f64,
-    /// Of [`Wheels::yaw_bias_rad_per_m`].
-    pub yaw_bias_rad_per_m: f64,
-}
-
 /// A time in which the laser tells nothing of the motion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stretch {
-    /// Last time in the light before it, seconds from the start of the drive.
+    /// Last time in the light before it or first in the dark, seconds from the start of the drive.
     pub from_s: f64,
     /// First time in the light after it.
     pub to_s: f64,
     /// The wheels tell nothing either: the robot was off, and may have been carried.
     pub carried: bool,
-}
-
-/// A sentence that says what the place is called where the robot is.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Claim {
-    /// When, seconds from the start of the drive.
-    pub said_s: f64,
-    /// The name.
-    pub name: String,
-    /// Which place was meant, world frame.
-    pub at: Point,
 }
 
 /// Everything that came in, and the simulator's settings behind it.
@@ -103,9 +64,7 @@ pub struct Seen<'a> {
     pub drive: &'a Drive,
     /// The same as its wheels measured it.
     pub odometry: &'a Drive,
-    /// The wheels' noise; their systematic errors are not looked at.
-    pub wheels: &'a Wheels,
-    /// What is known of these.
+    /// What is known of these wheels: their noise, and how wrong they may always be.
     pub prior: &'a WheelsPrior,
     /// When it was dark, in order of time, apart from each other.
     pub dark: &'a [Stretch],
@@ -114,10 +73,10 @@ pub struct Seen<'a> {
     /// Its messages; only scans matter.
     pub stream: &'a [Message],
     /// Of each laser, scans closer to each other than this are left out, seconds: they cost time
-    /// and say the same.
+    /// and say the same. 1 is fine.
     pub stride_s: f64,
     /// What people said.
-    pub said: &'a [Claim],
+    pub said: &'a [Said],
     /// Share of false sentences.
     pub epsilon: f64,
     /// Number of names that a false sentence draws from.
@@ -177,15 +136,15 @@ pub fn posterior(
     at_s: &[f64],
 ) -> Result<Vec<Posterior>, ReferenceError> {
     for hypothesis in hypotheses {
-        hypothesis.check(seen.dark)?;
+        check(hypothesis, seen.dark)?;
     }
     let told: Vec<_> = hypotheses.iter().map(|h| (rays::ratios(seen, h), words::ratios(seen, h))).collect();
     let at = |&t_s: &f64| {
         let links = wheels::links(seen, t_s);
-        let truth = links.log_density(seen.drive, &Hypothesis::default());
+        let of_truth = links.log_density(seen.drive, &truth());
         let weigh = |(h, (laser, words)): (&Hypothesis, &(Vec<_>, Vec<_>))| Terms {
             // The truth itself is no different from the truth, whatever the rounding.
-            wheels: if h.pieces.is_empty() { 0.0 } else { links.log_density(seen.drive, h) - truth },
+            wheels: if h.pieces.is_empty() { 0.0 } else { links.log_density(seen.drive, h) - of_truth },
             laser: sum_up_to(t_s, laser),
             words: sum_up_to(t_s, words),
         };
@@ -195,37 +154,45 @@ pub fn posterior(
     Ok(at_s.iter().map(at).collect())
 }
 
-impl Hypothesis {
-    /// `world_from_true` at a time.
-    pub fn world_from_true(&self, t_s: f64) -> Pose {
-        let begun = self.pieces.iter().rev().find(|p| p.from_s <= t_s);
-        begun.map(|p| p.world_from_true).unwrap_or_default()
-    }
+/// Where a hypothesis holds the robot to be, which really is where the drive says.
+fn pose(hypothesis: &Hypothesis, drive: &Drive, t_s: f64) -> Pose {
+    hypothesis.at(t_s + HAIR_S, &drive.at(t_s))
+}
 
-    /// Where it holds the robot to be, which really is where the drive says.
-    fn pose(&self, drive: &Drive, t_s: f64) -> Pose {
-        compose(&self.world_from_true(t_s), &drive.at(t_s))
-    }
-
-    fn check(&self, dark: &[Stretch]) -> Result<(), ReferenceError> {
-        let hidden = |p: &&Piece| dark.iter().any(|d| d.from_s < p.from_s && p.from_s <= d.to_s);
-        match self.pieces.iter().find(|p| !hidden(p)) {
-            Some(p) => Err(ReferenceError::LitJump { hypothesis: self.name.clone(), from_s: p.from_s }),
-            None => Ok(()),
-        }
+/// Each piece begins later than a dark stretch does, and not later than it ends.
+fn check(hypothesis: &Hypothesis, dark: &[Stretch]) -> Result<(), ReferenceError> {
+    let within = |s: f64, d: &Stretch| d.from_s + HAIR_S < s && s <= d.to_s + HAIR_S;
+    match hypothesis.pieces.iter().find(|p| !dark.iter().any(|d| within(p.from_s, d))) {
+        Some(p) => Err(ReferenceError::LitJump { hypothesis: hypothesis.name.clone(), from_s: p.from_s }),
+        None => Ok(()),
     }
 }
 
+/// The hypothesis that the robot is where it is.
+fn truth() -> Hypothesis {
+    Hypothesis { name: String::new(), pieces: Vec::new() }
+}
+
 impl Stretch {
+    /// On dark floor.
+    pub fn dark((from_s, to_s): (f64, f64)) -> Self {
+        Self { from_s, to_s, carried: false }
+    }
+
+    /// The robot was off, and somewhere else, with its odometry anew, from `at_s` on.
+    pub fn restart(at_s: f64) -> Self {
+        Self { from_s: at_s - STEP_S, to_s: at_s, carried: true }
+    }
+
     /// Time steps of the drive, from the first on and before the last, that it touches.
     fn steps(&self) -> std::ops::Range<usize> {
         let step = |t_s: f64| t_s.max(0.0) / STEP_S;
         step(self.from_s + HAIR_S).floor() as usize..step(self.to_s - HAIR_S).ceil() as usize
     }
 
-    /// Whether the laser sees nothing at a time.
+    /// Whether the laser sees nothing at a time. It may or may not at the very first.
     fn hides(&self, t_s: f64) -> bool {
-        self.from_s + HAIR_S < t_s && t_s < self.to_s - HAIR_S
+        self.from_s - HAIR_S < t_s && t_s < self.to_s - HAIR_S
     }
 }
 

@@ -12,12 +12,10 @@
 //! moved pose: mountings, posts, dark walls and glass are in both. Rays without information, and
 //! those that something in front of the true wall sends back (legs), say the same under all.
 
-use super::super::laser::{LaserModel, Scene};
-use super::super::people::People;
-use super::super::random::Draw;
-use super::super::robot::{Drive, STEP_S};
-use super::{HAIR_S, Hypothesis, Seen};
-use toponym_proto::{Message, Pose, Scan};
+use super::super::robot::STEP_S;
+use super::super::{Draw, Drive, LaserModel, People, Scene};
+use super::{HAIR_S, Hypothesis, Seen, pose};
+use toponym_proto::{Message, Scan};
 
 /// Share of the rays that anything may have sent back, e⁻¹²: people who stand there under one
 /// hypothesis only, edges that a ray just misses. It bounds what a single ray can say.
@@ -32,7 +30,7 @@ pub(super) fn ratios(seen: &Seen<'_>, hypothesis: &Hypothesis) -> Vec<(f64, f64)
     let mut ratios = Vec::new();
     for laser in seen.lasers {
         for (t_s, scan) in used(seen, laser) {
-            if t_s >= first.from_s && hypothesis.world_from_true(t_s) != Pose::default() {
+            if t_s + HAIR_S >= first.from_s {
                 ratios.push((t_s, ratio(seen, laser, scan, t_s, &moved)));
             }
         }
@@ -42,7 +40,7 @@ pub(super) fn ratios(seen: &Seen<'_>, hypothesis: &Hypothesis) -> Vec<(f64, f64)
 
 /// The drive that the hypothesis believes in.
 fn moved(drive: &Drive, hypothesis: &Hypothesis) -> Drive {
-    let poses = (0..drive.poses.len()).map(|k| hypothesis.pose(drive, k as f64 * STEP_S)).collect();
+    let poses = (0..drive.poses.len()).map(|k| pose(hypothesis, drive, k as f64 * STEP_S)).collect();
     Drive { poses }
 }
 

@@ -1,8 +1,5 @@
-use super::super::geom::Rect;
-use super::super::laser::Scene;
-use super::super::people::People;
-use super::super::random::Draw;
-use super::super::world::Plan;
+use super::super::geom::{Rect, between, compose};
+use super::super::{Draw, People, Plan, Scene, Sentence, Wheels};
 use super::wheels::{Link, Systematic};
 use super::*;
 use std::f64::consts::FRAC_PI_2;
@@ -58,18 +55,15 @@ fn moved(name: &str, pieces: &[(f64, f64)]) -> Hypothesis {
     Hypothesis { name: name.into(), pieces: pieces.iter().map(piece).collect() }
 }
 
-fn prior() -> WheelsPrior {
-    WheelsPrior { scale_error: 0.05, turn_error: 0.05, yaw_bias_rad_per_m: 0.005 }
-}
-
-/// Wheels with systematic errors from the prior.
-fn drawn(prior: &WheelsPrior, draw: &mut Draw) -> Wheels {
-    Wheels {
-        scale_error: prior.scale_error * draw.normal(),
-        turn_error: prior.turn_error * draw.normal(),
-        yaw_bias_rad_per_m: prior.yaw_bias_rad_per_m * draw.normal(),
-        noise_m: 0.05,
-        ..Wheels::default()
+/// Fair wheels that count metres badly, `noise_m` off after the first.
+fn prior(noise_m: f64) -> WheelsPrior {
+    WheelsPrior {
+        scale: 0.05,
+        turn: 0.05,
+        yaw_bias_rad_per_m: 0.005,
+        noise_m,
+        yaw_noise_rad: 0.012,
+        turn_noise_rad: 0.02,
     }
 }
 
@@ -78,14 +72,12 @@ fn seen<'a>(
     world: &'a World,
     (drive, dark): &'a (Drive, Vec<Stretch>),
     odometry: &'a Drive,
-    wheels: &'a Wheels,
     prior: &'a WheelsPrior,
 ) -> Seen<'a> {
     Seen {
         world,
         drive,
         odometry,
-        wheels,
         prior,
         dark,
         lasers: &[],
@@ -108,15 +100,15 @@ fn errors_in_the_dark_spread_as_predicted() {
     let drive =
         driven(Pose::default(), &[&[(2.0, 1.0); 3][..], &[(4.0, -1.5), (5.0, 0.7), (3.0, 0.0)]].concat());
     let stretch = Stretch { from_s: lit.duration_s(), to_s: drive.duration_s(), carried: false };
-    let rel = super::super::geom::between(&drive.at(stretch.from_s), &drive.at(stretch.to_s));
-    let (prior, n) = (prior(), 2000);
+    let rel = between(&drive.at(stretch.from_s), &drive.at(stretch.to_s));
+    let (prior, n) = (prior(0.05), 2000);
     let (mut sample, mut predicted) = (plane::ZERO, plane::ZERO);
     for seed in 0..n {
         let mut draw = Draw::new(seed, 0);
-        let wheels = drawn(&prior, &mut draw);
+        let wheels = prior.draw(&mut draw);
         let odometry = drive.measured(&wheels, &mut draw);
-        let learned = Systematic::learn(&drive, &odometry, &wheels, &prior, 0..lit.poses.len() - 1);
-        let link = Link::new(&drive, &odometry, &wheels, learned.mean, &stretch);
+        let learned = Systematic::learn(&drive, &odometry, &prior, 0..lit.poses.len() - 1);
+        let link = Link::new(&drive, &odometry, &prior, learned.mean, &stretch);
         let e = link.residual(&rel);
         let spread = plane::add(&link.noise, &plane::through(&link.by_systematic, &learned.covariance));
         for i in 0..3 {
@@ -137,18 +129,18 @@ fn errors_in_the_dark_spread_as_predicted() {
 
 #[test]
 fn who_claims_a_probability_is_right_as_often() {
-    let (world, prior) = (stalls(false), prior());
+    let (world, prior) = (stalls(false), prior(0.12));
     let tours = [tour(false), tour(true)];
     let mut claims = Vec::new();
     for seed in 0..200 {
         let mut draw = Draw::new(seed, 1);
         let right = draw.chance(0.5);
         let tour = &tours[usize::from(right)];
-        let wheels = Wheels { noise_m: 0.12, ..drawn(&prior, &mut draw) };
+        let wheels = prior.draw(&mut draw);
         let odometry = tour.0.measured(&wheels, &mut draw);
         let other = if right { -PITCH_M } else { PITCH_M };
-        let hypotheses = [Hypothesis::default(), moved("other", &[(tour.1[0].to_s - 1.0, other)])];
-        let p = last(&seen(&world, tour, &odometry, &wheels, &prior), &hypotheses).p;
+        let hypotheses = [truth(), moved("other", &[(tour.1[0].to_s, other)])];
+        let p = last(&seen(&world, tour, &odometry, &prior), &hypotheses).p;
         claims.push((p[0].max(p[1]), p[0] > p[1]));
     }
     for (low, high) in [(0.5, 0.8), (0.8, 0.95), (0.95, 1.1), (0.5, 1.1)] {
@@ -164,46 +156,46 @@ fn who_claims_a_probability_is_right_as_often() {
 #[test]
 fn the_light_teaches_systematic_errors_and_sharpens_the_dark() {
     let drive = driven(Pose::default(), &[(24.0, 0.0)]);
-    let (world, known) = (stalls(false), prior());
+    let (world, known) = (stalls(false), prior(0.01));
     let wheels = Wheels { scale_error: 0.06, ..Wheels::default() };
     let odometry = drive.measured(&wheels, &mut Draw::new(1, 0));
-    let hypotheses = [Hypothesis::default(), moved("other", &[(23.0, PITCH_M)])];
+    let hypotheses = [truth(), moved("other", &[(24.0, PITCH_M)])];
     let dark_from = |from_s| {
         let tour = (drive.clone(), vec![Stretch { from_s, to_s: 24.0, carried: false }]);
-        last(&seen(&world, &tour, &odometry, &wheels, &known), &hypotheses).p[0]
+        last(&seen(&world, &tour, &odometry, &known), &hypotheses).p[0]
     };
     assert!(dark_from(8.0) > 0.99, "{}", dark_from(8.0));
     assert!(dark_from(0.0) < 0.6, "6 % of 24 m look like {PITCH_M} m more: {}", dark_from(0.0));
-    let learned = Systematic::learn(&drive, &odometry, &wheels, &known, 0..400);
+    let learned = Systematic::learn(&drive, &odometry, &known, 0..400);
     assert!((learned.mean[0] - 0.06).abs() < 0.015, "{learned:?}");
     assert!(learned.covariance[0][0].sqrt() < 0.01, "{learned:?}");
 }
 
 #[test]
 fn nothing_counts_before_it_is_light_again() {
-    let (world, tour, prior) = (stalls(false), tour(false), prior());
+    let (world, tour, prior) = (stalls(false), tour(false), prior(0.01));
     let wheels = Wheels::default();
     let odometry = tour.0.measured(&wheels, &mut Draw::new(1, 0));
     let other = moved("other", &[(tour.1[0].from_s + 1.0, PITCH_M)]);
-    let seen = seen(&world, &tour, &odometry, &wheels, &prior);
+    let seen = seen(&world, &tour, &odometry, &prior);
     let at_s = [0.0, tour.1[0].to_s - 0.1, tour.1[0].to_s];
-    let beliefs = posterior(&seen, &[Hypothesis::default(), other], &[1.0, 3.0], &at_s).unwrap();
+    let beliefs = posterior(&seen, &[truth(), other], &[1.0, 3.0], &at_s).unwrap();
     assert_eq!((&beliefs[0].p, &beliefs[1].p), (&vec![0.25, 0.75], &vec![0.25, 0.75]));
     assert!(beliefs[2].terms[1].wheels < -5.0, "{:?}", beliefs[2]);
 }
 
 #[test]
 fn look_alikes_with_the_same_way_between_them_are_even() {
-    let (world, (drive, mut dark), prior) = (stalls(false), tour(false), prior());
+    let (world, (drive, mut dark), prior) = (stalls(false), tour(false), prior(0.01));
     // Carried by nobody knows how much, and then the same way through the dark.
     dark.insert(0, Stretch { from_s: 1.0, to_s: 1.5, carried: true });
     let tour = (drive, dark);
     let wheels = Wheels::default();
     let odometry = tour.0.measured(&wheels, &mut Draw::new(1, 0));
-    let seen = seen(&world, &tour, &odometry, &wheels, &prior);
-    let even = last(&seen, &[Hypothesis::default(), moved("other", &[(1.2, PITCH_M)])]);
+    let seen = seen(&world, &tour, &odometry, &prior);
+    let even = last(&seen, &[truth(), moved("other", &[(1.2, PITCH_M)])]);
     assert!((even.p[0] - 0.5).abs() < 1e-9, "{even:?}");
-    let truth = last(&seen, &[Hypothesis::default(), Hypothesis::default()]);
+    let truth = last(&seen, &[truth(), truth()]);
     assert_eq!(truth.p, [0.5, 0.5]);
 }
 
@@ -212,13 +204,12 @@ fn stretches_share_their_systematic_errors() {
     let drive = driven(Pose::default(), &[(20.0, 0.0)]);
     let stretch = |from_s, to_s| Stretch { from_s, to_s, carried: false };
     let tour = (drive, vec![stretch(0.0, 10.0), stretch(10.0, 20.0)]);
-    let (world, prior) = (stalls(false), WheelsPrior { scale_error: 0.05, ..WheelsPrior::default() });
-    let wheels = Wheels { noise_m: 0.01, ..Wheels::perfect() };
+    let (world, prior) = (stalls(false), WheelsPrior { turn: 0.0, yaw_bias_rad_per_m: 0.0, ..prior(0.01) });
     let odometry = tour.0.measured(&Wheels::perfect(), &mut Draw::new(1, 0));
     // Each way is off by half a metre, once by the same scale, once by opposite ones.
     let alike = moved("alike", &[(9.0, 0.5), (19.0, 1.0)]);
     let opposite = moved("opposite", &[(9.0, 0.5), (19.0, 0.0)]);
-    let belief = last(&seen(&world, &tour, &odometry, &wheels, &prior), &[alike, opposite]);
+    let belief = last(&seen(&world, &tour, &odometry, &prior), &[alike, opposite]);
     assert!(belief.p[0] > 0.999, "{belief:?}");
     assert!((belief.terms[0].wheels + 0.5).abs() < 0.01, "one standard deviation: {belief:?}");
 }
@@ -243,13 +234,13 @@ fn scanned(world: &World, drive: &Drive, laser: &LaserModel, t_s: f64) -> Messag
 
 #[test]
 fn a_room_that_differs_is_told_by_the_first_scan() {
-    let (tour, prior, laser) = (tour(false), WheelsPrior::default(), [LaserModel::default()]);
-    let (wheels, to_s) = (Wheels::rough(), tour.1[0].to_s);
-    let hypotheses = [Hypothesis::default(), moved("other", &[(to_s - 1.0, PITCH_M)])];
+    let (tour, prior, laser) = (tour(false), prior(0.12), [LaserModel::default()]);
+    let to_s = tour.1[0].to_s;
+    let hypotheses = [truth(), moved("other", &[(to_s, PITCH_M)])];
     for pillar in [true, false] {
         let world = stalls(pillar);
         let stream = [0.4, 0.0].map(|before_s| scanned(&world, &tour.0, &laser[0], to_s - before_s));
-        let seen = Seen { lasers: &laser, stream: &stream, ..seen(&world, &tour, &tour.0, &wheels, &prior) };
+        let seen = Seen { lasers: &laser, stream: &stream, ..seen(&world, &tour, &tour.0, &prior) };
         let belief = &posterior(&seen, &hypotheses, &[], &[to_s]).unwrap()[0];
         if pillar {
             assert!(belief.p[0] > 0.9999 && belief.terms[1].laser < -50.0, "{belief:?}");
@@ -261,11 +252,11 @@ fn a_room_that_differs_is_told_by_the_first_scan() {
 
 #[test]
 fn scans_in_the_dark_too_soon_after_another_or_on_legs_say_nothing() {
-    let (world, tour, prior, laser) = (stalls(true), tour(false), prior(), [LaserModel::default()]);
-    let (wheels, to_s) = (Wheels::rough(), tour.1[0].to_s);
-    let hypothesis = moved("other", &[(to_s - 1.0, PITCH_M)]);
+    let (world, tour, prior, laser) = (stalls(true), tour(false), prior(0.12), [LaserModel::default()]);
+    let to_s = tour.1[0].to_s;
+    let hypothesis = moved("other", &[(to_s, PITCH_M)]);
     let told = |stream: &[Message], stride_s: f64| {
-        let seen = seen(&world, &tour, &tour.0, &wheels, &prior);
+        let seen = seen(&world, &tour, &tour.0, &prior);
         let ratios = rays::ratios(&Seen { lasers: &laser, stream, stride_s, ..seen }, &hypothesis);
         ratios.into_iter().map(|(at_s, log_ratio)| (at_s - to_s, log_ratio)).collect::<Vec<_>>()
     };
@@ -283,16 +274,20 @@ fn scans_in_the_dark_too_soon_after_another_or_on_legs_say_nothing() {
 
 #[test]
 fn words_decide_and_can_be_outvoted() {
-    let (world, tour, prior) = (stalls(false), tour(false), prior());
-    let (wheels, to_s) = (Wheels::rough(), tour.1[0].to_s);
-    let hypotheses = [Hypothesis::default(), moved("other", &[(to_s - 1.0, PITCH_M)])];
-    let claims: Vec<Claim> = ["right", "left", "left", "attic"]
+    let (world, tour, prior) = (stalls(false), tour(false), prior(0.12));
+    let to_s = tour.1[0].to_s;
+    let hypotheses = [truth(), moved("other", &[(to_s, PITCH_M)])];
+    let said: Vec<Said> = ["right", "left", "left", "attic"]
         .iter()
         .zip(1..)
-        .map(|(name, k)| Claim { said_s: to_s + f64::from(k) / 10.0, name: (*name).into(), at: [20.0, 4.0] })
+        .map(|(name, k)| {
+            let began_s = to_s + f64::from(k) / 10.0;
+            let sentence = Sentence { began_s, ended_s: began_s + 2.0, text: String::new() };
+            let claim = Claim { name: (*name).into(), at: [20.0, 4.0], held: *name == "left" };
+            Said { sentence, claim: Some(claim) }
+        })
         .collect();
-    let seen =
-        Seen { said: &claims, epsilon: 0.2, vocabulary: 4, ..seen(&world, &tour, &tour.0, &wheels, &prior) };
+    let seen = Seen { said: &said, epsilon: 0.2, vocabulary: 4, ..seen(&world, &tour, &tour.0, &prior) };
     let at_s = [0.0, 0.1, 0.2, 0.3, 0.4].map(|s| to_s + s);
     let beliefs = posterior(&seen, &hypotheses, &[], &at_s).unwrap();
     // A name that fits is (0.8 + 0.05) / 0.05 = 17 times as likely as one that does not.
@@ -307,8 +302,8 @@ fn words_decide_and_can_be_outvoted() {
 
 #[test]
 fn a_jump_in_the_light_is_an_error() {
-    let (world, tour, prior, wheels) = (stalls(false), tour(false), prior(), Wheels::default());
-    let seen = seen(&world, &tour, &tour.0, &wheels, &prior);
+    let (world, tour, prior) = (stalls(false), tour(false), prior(0.05));
+    let seen = seen(&world, &tour, &tour.0, &prior);
     let jump = moved("jump", &[(tour.1[0].from_s, 1.0)]);
     let error = posterior(&seen, &[jump], &[], &[1.0]).unwrap_err();
     assert_eq!(error, ReferenceError::LitJump { hypothesis: "jump".into(), from_s: tour.1[0].from_s });

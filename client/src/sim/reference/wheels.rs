@@ -1,7 +1,7 @@
 //! What the wheels tell of the motion in the dark.
 //!
 //! One step of the drive goes δ = (dx, dy, dθ) in the body frame, w metres far, and is measured
-//! ([`Drive::measured`]) as
+//! (`Drive::measured`) as
 //!
 //! ```text
 //! mx = (1 + s) dx + ε₁,      ε₁ ~ N(0, noise_m² w)
@@ -12,12 +12,13 @@
 //! The systematic errors θ = (s, t, b) are learned where the laser tells δ, and leave the dark with
 //! a mean motion m and an error of it, m⁻¹ ∘ δ_dark = exp(G (θ − θ̂) + noise).
 
+use super::super::Drive;
 use super::super::geom::{between, compose};
-use super::super::robot::{Drive, STEP_S, Wheels};
+use super::super::robot::STEP_S;
 use super::plane::{
     Mat3, Vec3, ZERO, add, apply, carried_over, diagonal, inverse, log, log_normal, mul, through, transpose,
 };
-use super::{HAIR_S, Hypothesis, Seen, Stretch, WheelsPrior};
+use super::{HAIR_S, Hypothesis, Seen, Stretch, WheelsPrior, pose};
 use toponym_proto::Pose;
 
 /// Keeps what exact wheels measure from being infinitely certain: variance of a step, m² or rad².
@@ -41,14 +42,13 @@ impl Systematic {
     pub(super) fn learn(
         drive: &Drive,
         odometry: &Drive,
-        wheels: &Wheels,
         prior: &WheelsPrior,
         steps: impl Iterator<Item = usize>,
     ) -> Self {
         let (mut information, mut pull) = (ZERO, [0.0; 3]);
         for k in steps {
             let (Some(truth), Some(measured)) = (step(drive, k), step(odometry, k)) else { continue };
-            let [x_variance, yaw_variance] = variances(&truth, wheels);
+            let [x_variance, yaw_variance] = variances(&truth, prior);
             for (row, residual, variance) in [
                 ([truth.x_m, 0.0, 0.0], measured.x_m - truth.x_m, x_variance),
                 ([0.0, truth.yaw_rad, way_m(&truth)], measured.yaw_rad - truth.yaw_rad, yaw_variance),
@@ -63,7 +63,7 @@ impl Systematic {
             }
         }
         // In this form, a σ of 0, an error known to be absent, is nothing special.
-        let sigmas = diagonal([prior.scale_error, prior.turn_error, prior.yaw_bias_rad_per_m]);
+        let sigmas = diagonal([prior.scale, prior.turn, prior.yaw_bias_rad_per_m]);
         let scaled = add(&diagonal([1.0; 3]), &through(&sigmas, &information));
         let covariance = through(&sigmas, &inverse(&scaled));
         Self { mean: apply(&covariance, pull), covariance }
@@ -89,7 +89,7 @@ impl Link {
     pub(super) fn new(
         drive: &Drive,
         odometry: &Drive,
-        wheels: &Wheels,
+        prior: &WheelsPrior,
         errors: Vec3,
         stretch: &Stretch,
     ) -> Self {
@@ -105,7 +105,7 @@ impl Link {
             let (Some(truth), Some(measured)) = (step(drive, k), step(odometry, k)) else { continue };
             let (x_m, y_m) = (measured.x_m / (1.0 + s), measured.y_m / (1.0 + s));
             let yaw_rad = (measured.yaw_rad - b * x_m.hypot(y_m)) / (1.0 + t);
-            link.append(&Pose { x_m, y_m, yaw_rad }, variances(&truth, wheels), errors);
+            link.append(&Pose { x_m, y_m, yaw_rad }, variances(&truth, prior), errors);
         }
         link
     }
@@ -140,13 +140,13 @@ pub(super) struct Links {
 /// The dark stretches that were over at a time, with what the light had taught until then. A
 /// carried robot has no link.
 pub(super) fn links(seen: &Seen<'_>, t_s: f64) -> Links {
-    let Seen { drive, odometry, wheels, prior, dark, .. } = *seen;
+    let Seen { drive, odometry, prior, dark, .. } = *seen;
     let hidden: Vec<_> = dark.iter().map(Stretch::steps).collect();
     let lit = |k: &usize| !hidden.iter().any(|d| d.contains(k));
     let steps_over = ((t_s + HAIR_S) / STEP_S) as usize;
-    let systematic = Systematic::learn(drive, odometry, wheels, prior, (0..steps_over).filter(lit));
+    let systematic = Systematic::learn(drive, odometry, prior, (0..steps_over).filter(lit));
     let ended = dark.iter().filter(|d| d.to_s <= t_s + HAIR_S && !d.carried);
-    let links = ended.map(|d| Link::new(drive, odometry, wheels, systematic.mean, d)).collect();
+    let links = ended.map(|d| Link::new(drive, odometry, prior, systematic.mean, d)).collect();
     Links { systematic, links }
 }
 
@@ -158,7 +158,7 @@ impl Links {
         let (mut mean, mut covariance) = ([0.0; 3], self.systematic.covariance);
         let mut sum = 0.0;
         for link in &self.links {
-            let asked = between(&hypothesis.pose(drive, link.from_s), &hypothesis.pose(drive, link.to_s));
+            let asked = between(&pose(hypothesis, drive, link.from_s), &pose(hypothesis, drive, link.to_s));
             let (g, residual) = (&link.by_systematic, link.residual(&asked));
             let expected = apply(g, mean);
             let surprise = [0, 1, 2].map(|i| residual[i] - expected[i]);
@@ -185,10 +185,10 @@ fn way_m(step: &Pose) -> f64 {
 }
 
 /// Variances of a step's measured way, m², and turn, rad², by noise.
-fn variances(truth: &Pose, wheels: &Wheels) -> [f64; 2] {
+fn variances(truth: &Pose, prior: &WheelsPrior) -> [f64; 2] {
     let (way_m, turn_rad) = (way_m(truth), truth.yaw_rad.abs());
     [
-        wheels.noise_m.powi(2) * way_m,
-        wheels.yaw_noise_rad.powi(2) * way_m + wheels.turn_noise_rad.powi(2) * turn_rad,
+        prior.noise_m.powi(2) * way_m,
+        prior.yaw_noise_rad.powi(2) * way_m + prior.turn_noise_rad.powi(2) * turn_rad,
     ]
 }
