@@ -1,5 +1,5 @@
 //! What an observer may believe who knows the building, the simulator's noise, and a list of
-//! hypotheses about where the robot is: the exact odds that a mapping server's are held against.
+//! hypotheses about where the robot is: the odds that a mapping server's are held against.
 //!
 //! The posterior over hypotheses h at a time t, from what came in up to t:
 //!
@@ -16,8 +16,8 @@
 //!
 //! What is approximate:
 //!
-//! - motion in the dark is linearised: steps are small, and its heading must be known to some tenths
-//!   of a radian at the stretch's end, as the ways there become banana-shaped beyond;
+//! - motion in the dark is linearised: good while its heading is known to 0.2 rad at the stretch's
+//!   end; beyond, the ends become banana-shaped, and the tails are heavier than this says;
 //! - the laser is taken to give every pose in the light exactly, and a hypothesis to hold it rigidly
 //!   at `T_h x`: rooms whose walls differ by less than the laser's noise are not fitted anew;
 //! - how far and how much the robot turned in the dark, and with it how large the noise is, comes
@@ -73,7 +73,7 @@ pub struct Seen<'a> {
     /// Its messages; only scans matter.
     pub stream: &'a [Message],
     /// Of each laser, scans closer to each other than this are left out, seconds: they cost time
-    /// and say the same. 1 is fine.
+    /// and say little more. 1 is fine.
     pub stride_s: f64,
     /// What people said.
     pub said: &'a [Said],
@@ -161,8 +161,8 @@ fn pose(hypothesis: &Hypothesis, drive: &Drive, t_s: f64) -> Pose {
 
 /// Each piece begins later than a dark stretch does, and not later than it ends.
 fn check(hypothesis: &Hypothesis, dark: &[Stretch]) -> Result<(), ReferenceError> {
-    let within = |s: f64, d: &Stretch| d.from_s + HAIR_S < s && s <= d.to_s + HAIR_S;
-    match hypothesis.pieces.iter().find(|p| !dark.iter().any(|d| within(p.from_s, d))) {
+    let within = |p: &Piece, d: &Stretch| d.from_s + HAIR_S < p.from_s && p.from_s <= d.to_s + HAIR_S;
+    match hypothesis.pieces.iter().find(|p| !dark.iter().any(|d| within(p, d))) {
         Some(p) => Err(ReferenceError::LitJump { hypothesis: hypothesis.name.clone(), from_s: p.from_s }),
         None => Ok(()),
     }
