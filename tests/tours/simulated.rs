@@ -1,14 +1,19 @@
 //! Tours of the simulator.
 
 use crate::tour::{Spoken, Tour, outright};
-use crate::truth::{Hypothesis, Named, Path, Piece, Question};
+use crate::truth::{Hypothesis, Named, Path, Piece, Question, Truth};
 use anyhow::Result;
 use toponym_core::Pose2;
 use toponym_proto::Pose;
+use toponym_sim::reference::{Seen, Stretch, posterior};
 use toponym_sim::tours::{self, Language, Played, Said};
 
 /// Time between two rows of the true path.
 const ROW_S: f64 = 0.1;
+/// Of each laser, the reference looks at a scan in so much time.
+const STRIDE_S: f64 = 1.0;
+/// Share of false sentences in [`Language::False20`].
+const FALSE_SHARE: f64 = 0.2;
 
 /// Their names.
 pub fn names() -> &'static [&'static str] {
@@ -19,19 +24,22 @@ pub fn names() -> &'static [&'static str] {
 pub fn tour(name: &str, seed: u64, languages: &[Language]) -> Result<Tour> {
     let tour = tours::tour(name, seed)?;
     let played = tour.play()?;
+    let path = path(&played);
+    let checkpoints_s = Truth::checkpoints_s(path.span_s());
     let hypotheses: Vec<Hypothesis> = tour.hypotheses.iter().map(hypothesis).collect();
     let spoken = languages.iter().filter_map(|&language| {
-        let mut spoken = spoken(&played, language)?;
-        spoken.reference = reference(&tour, &played, language);
-        Some((language, spoken))
+        let spoken = spoken(&played, language)?;
+        let reference = reference(&tour, &played, language, &checkpoints_s);
+        Some(reference.map(|mass| (language, Spoken { reference: Some(mass), ..spoken })))
     });
+    let spoken = spoken.collect::<Result<_>>()?;
     Ok(Tour {
         seed,
         robot: tour.scenario.robot.clone(),
-        path: path(&played),
+        path,
         hypotheses,
         dark_s: tour.blind_s.clone(),
-        spoken: spoken.collect(),
+        spoken,
         stream: played.stream,
     })
 }
@@ -71,9 +79,34 @@ fn named(said: &Said) -> Option<Named> {
     Some(Named { t_s: said.sentence.began_s, name: claim.name.clone() })
 }
 
-/// What an observer who knows the building may believe: by checkpoint and hypothesis.
-fn reference(_tour: &tours::Tour, _played: &Played, _language: Language) -> Option<Vec<Vec<f64>>> {
-    None
+/// What an observer who knows the building and the noise may believe: by checkpoint and hypothesis.
+fn reference(
+    tour: &tours::Tour,
+    played: &Played,
+    language: Language,
+    checkpoints_s: &[f64],
+) -> Result<Vec<Vec<f64>>> {
+    if tour.hypotheses.len() < 2 {
+        return Ok(vec![vec![1.0; tour.hypotheses.len()]; checkpoints_s.len()]);
+    }
+    let mut dark: Vec<Stretch> = tour.blind_s.iter().map(|&s| Stretch::dark(s)).collect();
+    dark.extend(tour.second_day_s.map(Stretch::restart));
+    dark.sort_by(|a, b| a.from_s.total_cmp(&b.from_s));
+    let seen = Seen {
+        world: &tour.scenario.world,
+        drive: &played.drive,
+        odometry: &played.odometry,
+        prior: &tour.wheels_prior,
+        dark: &dark,
+        lasers: &tour.scenario.lasers,
+        stream: &played.stream,
+        stride_s: STRIDE_S,
+        said: played.narration.get(&language).map_or(&[], Vec::as_slice),
+        epsilon: if language == Language::False20 { FALSE_SHARE } else { 0.0 },
+        vocabulary: tour.vocabulary.len(),
+    };
+    let at = posterior(&seen, &tour.hypotheses, &[], checkpoints_s)?;
+    Ok(at.into_iter().map(|a| a.p).collect())
 }
 
 #[cfg(test)]

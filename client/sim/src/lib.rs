@@ -21,6 +21,7 @@ mod laser;
 mod names;
 mod people;
 mod random;
+pub mod reference;
 mod robot;
 mod scenarios;
 mod storey;
