@@ -118,14 +118,6 @@ impl Args {
             },
         }
     }
-
-    /// The one tour and language to write.
-    pub fn only(&self, suite: &Suite) -> Result<(String, Language)> {
-        match (suite.tours.as_slice(), suite.languages.as_slice()) {
-            ([tour], [language]) => Ok((tour.clone(), *language)),
-            _ => bail!("--write: give one --tour and one --language, a folder for each"),
-        }
-    }
 }
 
 /// Why a tour is left out.
@@ -162,8 +154,10 @@ mod tests {
 
     #[test]
     fn one_tour_in_one_language_is_written() {
-        let args = |tour| Args::parse_from(["tours", "--tour", tour, "--language", "none", "--write", "d"]);
-        let only = |tour| args(tour).only(&args(tour).suite().unwrap());
+        let only = |tour| {
+            let suite = suite(&["--tour", tour, "--language", "none", "--write", "d"]).unwrap();
+            suite.only().map(|(tour, language)| (tour.to_owned(), language))
+        };
         assert!(only("all").is_err());
         assert_eq!(only("stata").unwrap(), ("stata".to_owned(), Language::None));
     }

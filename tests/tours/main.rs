@@ -32,7 +32,7 @@ fn main() -> Result<()> {
     }
     let suite = args.suite()?;
     if let Some(folder) = &args.write {
-        return write(folder, &args, &suite);
+        return write(folder, &suite);
     }
     let rows = suite.run()?;
     if let Some(file) = &args.results {
@@ -54,16 +54,16 @@ fn print(summary: &Summary, json: bool) -> Result<()> {
     Ok(())
 }
 
-fn write(folder: &Path, args: &Args, suite: &Suite) -> Result<()> {
-    let (name, language) = args.only(suite)?;
-    if !suite.is_there(&name) {
+fn write(folder: &Path, suite: &Suite) -> Result<()> {
+    let (name, language) = suite.only()?;
+    if !suite.is_there(name) {
         return Ok(());
     }
     for seed in suite.seeds.clone() {
-        let tour = suite.tour(&name, seed)?;
-        let case = tour.case(language).with_context(|| format!("{name} is not told in {}", language))?;
+        let tour = suite.tour(name, seed)?;
+        let case = tour.case(language).with_context(|| format!("{name} is not told in {language}"))?;
         let folder = folder.join(seed.to_string());
-        folder::write(&folder, &name, &language.to_string(), &case)
+        folder::write(&folder, name, &language.to_string(), &case)
             .with_context(|| format!("--write {}", folder.display()))?;
         println!("{}", folder.display());
     }

@@ -5,7 +5,7 @@ use crate::run::{self, Settings};
 use crate::score::{Outcome, Setting};
 use crate::tour::Tour;
 use crate::{simulated, stata};
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use std::ops::Range;
 use std::path::PathBuf;
 use std::sync::Mutex;
@@ -60,6 +60,14 @@ impl Suite {
         let mapped = mapped.into_iter().collect::<Result<Vec<Mapped>>>()?;
         let of_tour = mapped.chunks(self.seeds.clone().count().max(1));
         Ok(tours.iter().zip(of_tour).flat_map(|(tour, seeds)| self.rows(tour, seeds)).collect())
+    }
+
+    /// The one tour and language to write.
+    pub fn only(&self) -> Result<(&str, Language)> {
+        match (self.tours.as_slice(), self.languages.as_slice()) {
+            ([tour], [language]) => Ok((tour, *language)),
+            _ => bail!("--write: give one --tour and one --language, a folder for each"),
+        }
     }
 
     /// A tour of one seed.

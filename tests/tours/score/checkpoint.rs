@@ -95,7 +95,7 @@ impl Checkpoint {
         }
         let rest = (1.0 - reference.iter().sum::<f64>()).max(0.0);
         let apart: f64 = mass.iter().zip(reference).map(|(a, b)| (a - b).abs()).sum();
-        (apart + (self.mass_of_none() - rest).abs()) / 2.0
+        0.5 * (apart + (self.mass_of_none() - rest).abs())
     }
 }
 

@@ -175,12 +175,12 @@ mod tests {
         let seeds = vec![vec![(1.0, true); 4], vec![(1.0, false); 4]];
         let calibration = Calibration::of(&seeds).unwrap();
         assert!((calibration.ece - 0.5).abs() < 1e-12);
-        assert_eq!(calibration.ece_95, [0.0, 1.0]);
+        let is = |[low, high]: [f64; 2], want: [f64; 2]| {
+            (low - want[0]).abs() < 1e-12 && (high - want[1]).abs() < 1e-12
+        };
+        assert!(is(calibration.ece_95, [0.0, 1.0]));
         // Of seeds that are alike there is nothing to draw.
-        assert_eq!(
-            Calibration::of(&vec![vec![(0.9, true)]; 5]).unwrap().ece_95,
-            [0.1, 0.1].map(|_| 1.0 - 0.9)
-        );
+        assert!(is(Calibration::of(&vec![vec![(0.9, true)]; 5]).unwrap().ece_95, [0.1, 0.1]));
         assert_eq!(Calibration::of(&seeds), Calibration::of(&seeds));
     }
 }
