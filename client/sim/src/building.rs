@@ -8,7 +8,7 @@ use crate::geom::{Point, Rect, Segment, distance_m};
 const WALL_M: f64 = 0.2;
 
 /// Names for the rooms of a random office.
-const NAMES: [&str; 24] = [
+pub(crate) const NAMES: [&str; 24] = [
     "kitchen",
     "library",
     "gym",
@@ -192,7 +192,7 @@ fn row(
     }
 }
 
-fn pieces(per_10_m2: f64, area: &Rect) -> usize {
+pub(crate) fn pieces(per_10_m2: f64, area: &Rect) -> usize {
     ((area.x1_m - area.x0_m) * (area.y1_m - area.y0_m) / 10.0 * per_10_m2).round() as usize
 }
 
@@ -204,7 +204,7 @@ fn furnish(plan: &mut Plan, k: usize, draw: &mut Draw) {
 }
 
 /// One piece, against a wall or free; given up if it would bar the way from door to middle.
-fn furnish_once(plan: &mut Plan, k: usize, draw: &mut Draw) {
+pub(crate) fn furnish_once(plan: &mut Plan, k: usize, draw: &mut Draw) {
     let (_, area, _, spot) = plan.rooms[k].clone();
     let size_m = [draw.within((0.4, 1.8)), draw.within((0.35, 0.8))];
     let reach_m = size_m[0].hypot(size_m[1]) / 2.0;

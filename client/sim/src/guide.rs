@@ -41,10 +41,10 @@ pub struct Sentence {
 
 /// A stay in a room, seconds from the start of the drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Visit {
-    room: usize,
-    from_s: f64,
-    to_s: f64,
+pub(crate) struct Visit {
+    pub(crate) room: usize,
+    pub(crate) from_s: f64,
+    pub(crate) to_s: f64,
 }
 
 /// What the guide says along a drive, in order of time.
@@ -136,13 +136,13 @@ fn phrase(name: &str, first: bool, namesake: bool, draw: &mut Draw) -> String {
     known[draw.below(known.len())].replace("{}", name)
 }
 
-fn spoken(began_s: f64, text: String) -> Sentence {
+pub(crate) fn spoken(began_s: f64, text: String) -> Sentence {
     // People speak some fifteen letters a second.
     Sentence { began_s, ended_s: began_s + text.len() as f64 / 15.0, text }
 }
 
 /// Stays in rooms, in order; rooms win over the corridors they may overlap.
-fn visits(world: &World, drive: &Drive) -> Vec<Visit> {
+pub(crate) fn visits(world: &World, drive: &Drive) -> Vec<Visit> {
     let mut visits: Vec<Visit> = Vec::new();
     let looks = (drive.duration_s() / LOOK_S) as usize;
     let mut held: Option<usize> = None;

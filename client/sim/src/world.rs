@@ -210,6 +210,12 @@ impl World {
         }
     }
 
+    /// Index of the waypoint nearest to a point.
+    pub(crate) fn waypoint_near(&self, p: Point) -> usize {
+        let near = |k: &usize| distance_m(self.waypoints[*k], p);
+        (0..self.waypoints.len()).min_by(|a, b| near(a).total_cmp(&near(b))).unwrap_or_default()
+    }
+
     /// Index of the first room of that name.
     pub fn room(&self, name: &str) -> Option<usize> {
         self.rooms.iter().position(|r| r.name == name)

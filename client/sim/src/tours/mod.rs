@@ -13,12 +13,27 @@
 //! # Ok::<(), toponym_sim::SimError>(())
 //! ```
 
+mod court;
+mod design;
+mod plain;
+mod ring;
+mod stamp;
+mod strain;
+#[cfg(test)]
+mod tests;
+mod unit;
+mod words;
+
 use crate::geom::{Point, compose};
-use crate::{Drive, Incident, Scenario, Sentence, SimError, Truth, WheelsPrior};
-use std::collections::BTreeMap;
+use crate::robot::STEP_S;
+use crate::{Drive, Incident, Scenario, Sentence, SimError, Stream, Truth, WheelsPrior};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
-use toponym_proto::{Message, Pose};
+use toponym_proto::{Message, Pose, Stamp};
+
+/// Sets the draws of the second day apart from the first.
+const SECOND_DAY: u64 = 0x5ec0_0dda_0000_0000;
 
 /// Names of the tours.
 ///
@@ -158,10 +173,14 @@ pub struct Tour {
     pub drive: Drive,
     /// Stretches on dark floor: from, to, seconds.
     pub blind_s: Vec<(f64, f64)>,
+    /// When the robot came to where look-alikes part: out of a dark stretch, or switched on again.
+    pub returns_s: Vec<f64>,
     /// The first scan by which all hypotheses but the truth are refuted, if any is.
     pub decisive_s: Option<f64>,
     /// When the robot starts anew with another boot, if it does.
     pub second_day_s: Option<f64>,
+    /// The guide says nothing for so long after a return.
+    late_m: f64,
 }
 
 /// A tour as it was played.
@@ -190,31 +209,75 @@ pub struct Played {
 /// # Errors
 /// If there is no tour of that name.
 pub fn tour(name: &str, seed: u64) -> Result<Tour, SimError> {
-    let _ = seed;
-    Err(SimError::NoSuchTour(name.to_owned(), TOURS.join(", ")))
+    let unknown = || SimError::NoSuchTour(name.to_owned(), TOURS.join(", "));
+    let name = *TOURS.iter().find(|n| **n == name).ok_or_else(unknown)?;
+    match name {
+        "large" => court::large(name, seed),
+        "ring" | "ring-decided" => ring::ring(name, seed),
+        "start" => plain::start(name, seed),
+        "slip" | "unsigned" | "break" | "clean" => plain::office(name, seed),
+        _ => court::row(name, seed),
+    }
 }
 
 impl Tour {
     /// Plays it: the same every time.
     pub fn play(&self) -> Result<Played, SimError> {
-        let stream = self.scenario.stream(&self.drive)?;
+        let stream = self.stream()?;
+        let narration: BTreeMap<Language, Vec<Said>> =
+            Language::ALL.into_iter().map(|l| (l, words::narrate(self, l))).collect();
+        let held = |s: &Said| s.claim.as_ref().filter(|c| c.held).map(|c| c.name.clone());
+        let names: BTreeSet<String> = narration.values().flatten().filter_map(held).collect();
+        let names = names
+            .into_iter()
+            .flat_map(|n| words::rooms_called(self, &n).into_iter().map(move |c| (n.clone(), c)))
+            .collect();
         let truth = Truth {
             scans: stream.scans,
-            names: Vec::new(),
+            names,
             start: self.drive.at(0.0),
-            path_m: self.drive.path_m(),
+            path_m: self.path_m(),
             faults: stream.incidents.clone(),
         };
+        let questions = narration.iter().map(|(l, said)| (*l, words::questions(self, said))).collect();
         Ok(Played {
             stream: stream.messages,
             drive: self.drive.clone(),
             odometry: stream.odometry,
-            narration: BTreeMap::new(),
+            narration,
             truth,
-            questions: BTreeMap::new(),
+            questions,
             decisive_s: self.decisive_s,
             faults: stream.incidents,
         })
+    }
+
+    /// What the robot sends, each day with a boot of its own.
+    fn stream(&self) -> Result<Stream, SimError> {
+        let Some(second_s) = self.second_day_s else { return self.scenario.stream(&self.drive) };
+        let (first, second) = self.drive.poses.split_at((second_s / STEP_S).round() as usize);
+        let mut whole = self.scenario.stream(&Drive { poses: first.to_vec() })?;
+        let scenario = Scenario { seed: self.seed ^ SECOND_DAY, ..self.scenario.clone() };
+        let mut more = scenario.stream(&Drive { poses: second.to_vec() })?;
+        let later_ns = Stamp::from_seconds(second_s).ns;
+        for header in more.messages.iter_mut().filter_map(crate::header_mut) {
+            header.boot = 1;
+            header.stamp.ns += later_ns;
+        }
+        for (stamp, _) in &mut more.scans {
+            stamp.ns += later_ns;
+        }
+        whole.messages.extend(more.messages);
+        whole.scans.extend(more.scans);
+        whole.odometry.poses.extend(more.odometry.poses);
+        Ok(whole)
+    }
+
+    /// Way driven, without the jump overnight.
+    fn path_m(&self) -> f64 {
+        let first = self.second_day_s.map_or(self.drive.poses.len(), |s| (s / STEP_S).round() as usize);
+        let (first, second) = self.drive.poses.split_at(first);
+        [first, second].map(|poses| Drive { poses: poses.to_vec() }.path_m()).iter().sum()
     }
 }
 
