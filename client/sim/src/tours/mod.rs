@@ -259,6 +259,8 @@ impl Tour {
         let mut whole = self.scenario.stream(&Drive { poses: first.to_vec() })?;
         let scenario = Scenario { seed: self.seed ^ SECOND_DAY, ..self.scenario.clone() };
         let mut more = scenario.stream(&Drive { poses: second.to_vec() })?;
+        // Only the last day ends the stream: whatever else was said would have to come before.
+        whole.messages.retain(|m| !matches!(m, Message::End(_)));
         let later_ns = Stamp::from_seconds(second_s).ns;
         for header in more.messages.iter_mut().filter_map(crate::header_mut) {
             header.boot = 1;
