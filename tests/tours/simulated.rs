@@ -5,6 +5,7 @@ use crate::truth::{Hypothesis, Named, Path, Piece, Question, Truth};
 use anyhow::Result;
 use toponym_core::Pose2;
 use toponym_proto::Pose;
+use toponym_sim::STEP_S;
 use toponym_sim::reference::{Seen, Stretch, posterior};
 use toponym_sim::tours::{self, Language, Played, Said};
 
@@ -24,7 +25,7 @@ pub fn names() -> &'static [&'static str] {
 pub fn tour(name: &str, seed: u64, languages: &[Language]) -> Result<Tour> {
     let tour = tours::tour(name, seed)?;
     let played = tour.play()?;
-    let path = path(&played);
+    let path = path(&played, tour.second_day_s);
     let checkpoints_s = Truth::checkpoints_s(path.span_s());
     let hypotheses: Vec<Hypothesis> = tour.hypotheses.iter().map(hypothesis).collect();
     let spoken = languages.iter().filter_map(|&language| {
@@ -49,10 +50,13 @@ pub fn pose(p: &Pose) -> Pose2 {
     Pose2::new(p.x_m, p.y_m, p.yaw_rad)
 }
 
-fn path(played: &Played) -> Path {
+fn path(played: &Played, second_day_s: Option<f64>) -> Path {
     let rows = (played.drive.duration_s() / ROW_S) as usize;
-    let times = (0..=rows).map(|k| k as f64 * ROW_S);
-    Path::new(times.map(|t_s| (t_s, pose(&played.drive.at(t_s)))).collect())
+    let mut times: Vec<f64> = (0..=rows).map(|k| k as f64 * ROW_S).collect();
+    // Overnight it was carried: no pose between the two days may be made up.
+    times.extend(second_day_s.into_iter().flat_map(|s| [s - STEP_S, s]));
+    times.sort_by(f64::total_cmp);
+    Path::new(times.into_iter().map(|t_s| (t_s, pose(&played.drive.at(t_s)))).collect())
 }
 
 fn hypothesis(h: &tours::Hypothesis) -> Hypothesis {
@@ -112,12 +116,31 @@ fn reference(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toponym_proto::merge::order_stamp;
+    use toponym_proto::{Message, Stamp};
     use toponym_sim::Sentence;
     use toponym_sim::tours::Claim;
 
     fn said(text: &str, held: bool) -> Said {
         let sentence = Sentence { began_s: 3.0, ended_s: 4.0, text: text.into() };
         Said { sentence, claim: Some(Claim { name: "gym".into(), at: [0.0, 0.0], held }) }
+    }
+
+    #[test]
+    fn a_second_day_begins_where_the_robot_was_carried_and_is_told_of_in_order() {
+        let tour = tour("start", 1, &[Language::Simple]).unwrap();
+        let second_s = tours::tour("start", 1).unwrap().second_day_s.unwrap();
+        let (before, after) = (tour.path.at(second_s - STEP_S), tour.path.at(second_s));
+        assert!(before.distance_m(&after) > 2.0);
+        assert!(after.distance_m(&tour.path.at(second_s + STEP_S)) < 0.1);
+        assert!(tour.path.driven_m(second_s) - tour.path.driven_m(second_s - 1.0) < 2.0);
+        let stamps: Vec<Stamp> =
+            tour.case(Language::Simple).unwrap().messages.iter().map(order_stamp).collect();
+        let say = |m: &Message| matches!(m, Message::Say(_));
+        let messages = tour.case(Language::Simple).unwrap().messages;
+        for k in (1..messages.len()).filter(|&k| say(&messages[k])) {
+            assert!((stamps[k].seconds() - stamps[k - 1].seconds()).abs() < 1.0, "{:?}", messages[k]);
+        }
     }
 
     #[test]
