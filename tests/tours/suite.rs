@@ -173,6 +173,35 @@ mod tests {
     }
 
     #[test]
+    fn a_simulated_tour_is_mapped_and_its_posterior_is_one() {
+        let suite = |threads| Suite {
+            tours: vec!["small".into()],
+            languages: vec![Language::Simple],
+            particles: vec![2],
+            preset: Preset::Toponym,
+            seeds: 1..3,
+            threads,
+            shared: None,
+        };
+        let run = |threads| {
+            let mut row = suite(threads).run().unwrap().remove(0);
+            row.outcomes.iter_mut().for_each(|o| assert!(o.cpu_ms_per_s.take() > Some(0.0)));
+            row.outcomes
+        };
+        let outcomes = run(1);
+        assert_eq!(outcomes, run(2));
+        assert_eq!(outcomes.iter().map(|o| o.seed).collect::<Vec<_>>(), [1, 2]);
+        for outcome in outcomes {
+            assert!(outcome.hypotheses.len() > 1 && outcome.answers.of > 3 && outcome.labels.of > 3);
+            let mass: f64 = outcome.reference.unwrap().mass[3].iter().sum();
+            assert!((mass - 1.0).abs() < 1e-9, "{mass}");
+            for graphs in outcome.checkpoints.iter().map(|c| &c.as_ref().unwrap().graphs) {
+                assert!((graphs.iter().map(|g| g.0).sum::<f64>() - 1.0).abs() < 1e-9);
+            }
+        }
+    }
+
+    #[test]
     fn rows_are_by_tour_language_and_particles() {
         let suite = Suite {
             tours: vec!["walk".into()],

@@ -11,7 +11,7 @@ pub fn text(s: &Summary) -> String {
         format!("{}, {}, {}{particles}, {} seeds\n", setting.tour, setting.language, setting.preset, s.seeds);
     let mut line = |what: &str, figure: String| {
         // Writing to a string cannot fail.
-        let _ = writeln!(out, "  {what:<28} {figure}");
+        let _ = writeln!(out, "  {what:<32} {figure}");
     };
     line("true graphs' mass", masses(&s.masses));
     if let Some(reference) = &s.reference {
@@ -19,11 +19,11 @@ pub fn text(s: &Summary) -> String {
     }
     line("-ln mass", neg_log(s.masses.neg_log_mass.as_ref()));
     for (name, group) in &s.mass_by_hypothesis {
-        line(&format!("  mass of {name}"), format!("{:.3} over {} seeds", group.median, group.seeds));
+        line(&format!("  mass of {name:?}"), format!("{:.3} over {} seeds", group.median, group.seeds));
     }
     line("  mass of none of these", spread(s.mass_of_none));
     for (name, group) in &s.by_truth {
-        line(&format!("  where {name} is true"), format!("{:.3} over {} seeds", group.median, group.seeds));
+        line(&format!("  where {name:?} is true"), format!("{:.3} over {} seeds", group.median, group.seeds));
     }
     line(
         "distance from reference",
@@ -78,4 +78,27 @@ pub fn rate(r: &Rate) -> String {
 /// Expected calibration error with its interval.
 pub fn calibration(c: Option<&Calibration>) -> String {
     c.map_or("-".into(), |c| format!("{:.3} [{:.3}, {:.3}] of {}", c.ece, c.ece_95[0], c.ece_95[1], c.count))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::score::{Mapped, Outcome, Setting};
+    use crate::truth::{Hypothesis, Truth};
+
+    #[test]
+    fn what_is_not_known_is_a_dash_and_every_hypothesis_has_its_line() {
+        let hypotheses = ["by the gym", "by the cafe"].map(Hypothesis::truth).to_vec();
+        let truth = Truth { hypotheses, ..Truth::default() };
+        let mapped = Mapped { checkpoints: vec![Some(crate::graph::Graphs::default())], ..Mapped::default() };
+        let outcome = Outcome::new(7, &truth, &mapped, None);
+        let setting = Setting { tour: "small".into(), particles: Some(30), ..Setting::default() };
+        let text = text(&Summary::new(setting, &[outcome]));
+        assert!(text.starts_with("small, , , 30 particles, 1 seeds\n"), "{text}");
+        assert!(text.contains("where \"by the gym\" is true"));
+        assert!(text.contains("not told by this mapper"));
+        let line = |what: &str| text.lines().find(|l| l.trim().starts_with(what)).unwrap();
+        assert!(line("trajectory error (m)").ends_with(" -") && line("processor").ends_with(" -"));
+        assert_eq!(number(Some(123.4)), "123");
+    }
 }
