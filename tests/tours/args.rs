@@ -79,7 +79,7 @@ pub struct Args {
     #[arg(long, value_name = "DIR", conflicts_with_all = ["tour", "language", "results"])]
     pub score: Option<PathBuf>,
     /// Run every tour in every language with 30 particles and with one, and write the table
-    #[arg(long, value_name = "FILE.md", conflicts_with_all = ["tour", "language", "json"])]
+    #[arg(long, value_name = "FILE.md", conflicts_with_all = ["tour", "language", "particles", "json"])]
     pub results: Option<PathBuf>,
 }
 

@@ -67,13 +67,13 @@ impl Checkpoint {
     /// Weight of the graphs of each hypothesis; one that is of two counts for both.
     pub fn mass(&self) -> Vec<f64> {
         let hypotheses = self.graphs.first().map_or(0, |g| g.1.len());
-        let of = |h: usize| self.graphs.iter().filter(|g| g.1[h]).map(|g| g.0).sum::<f64>();
+        let of = |h: usize| self.graphs.iter().filter(|g| g.1[h]).fold(0.0, |sum, g| sum + g.0);
         (0..hypotheses).map(|h| of(h).min(1.0)).collect()
     }
 
     /// Weight of the graphs of none of the hypotheses.
     pub fn mass_of_none(&self) -> f64 {
-        self.graphs.iter().filter(|g| !g.1.contains(&true)).map(|g| g.0).sum()
+        self.graphs.iter().filter(|g| !g.1.contains(&true)).fold(0.0, |sum, g| sum + g.0)
     }
 
     /// The best graph's weight, and whether it is of the truth.

@@ -89,7 +89,7 @@ pub struct Outcome {
 pub struct Reference {
     /// By checkpoint, by hypothesis.
     pub mass: Vec<Vec<f64>>,
-    /// By checkpoint, of all hypotheses that are the truth until then.
+    /// By checkpoint, of all hypotheses that ask for no other graph than the truth until then.
     pub mass_true: Vec<f64>,
 }
 
@@ -97,7 +97,7 @@ impl Reference {
     /// Of masses by checkpoint and hypothesis.
     pub fn new(mass: Vec<Vec<f64>>, truth: &Truth) -> Self {
         let so_far = |t_s: f64, row: &Vec<f64>| {
-            let same = truth.hypotheses.iter().map(|h| h.is_the_truth_until(&truth.path, t_s));
+            let same = truth.hypotheses.iter().map(|h| topology::is_as_true(h, truth, t_s));
             row.iter().zip(same).filter(|(_, same)| *same).map(|(m, _)| m).sum()
         };
         let mass_true = truth.checkpoints_s.iter().zip(&mass).map(|(t_s, row)| so_far(*t_s, row)).collect();
@@ -143,7 +143,7 @@ mod tests {
     use super::topology::tests::{elsewhere, map_of, out_and_back, stamps};
     use super::*;
     use crate::graph::Place;
-    use crate::truth::Hypothesis;
+    use crate::truth::{Hypothesis, Piece};
 
     fn truth() -> Truth {
         let hypotheses = vec![Hypothesis::truth("here"), elsewhere()];
@@ -164,10 +164,17 @@ mod tests {
     }
 
     #[test]
-    fn a_references_mass_on_the_truth_is_all_that_nothing_tells_from_it_yet() {
-        let reference =
-            Reference::new(vec![vec![0.5, 0.5], vec![0.4, 0.6], vec![0.3, 0.7], vec![0.9, 0.1]], &truth());
-        // The ways part at 31 s, just after half of the tour.
-        assert_eq!(reference.mass_true, [1.0, 1.0, 0.3, 0.9]);
+    fn a_references_mass_on_the_truth_is_that_of_all_who_ask_for_the_same_graph() {
+        let rows = vec![vec![0.5, 0.5], vec![0.4, 0.6], vec![0.3, 0.7], vec![0.9, 0.1]];
+        let mass_true = Reference::new(rows.clone(), &truth()).mass_true;
+        // The ways part at 31 s, but only at the end is there a loop that one of them asks for.
+        assert_eq!(mass_true, [1.0, 1.0, 1.0, 0.9]);
+        // To whom both have gone somewhere new, it is the same graph.
+        let moved = |name: &str, y_m| {
+            let world_from_true = toponym_core::Pose2::new(0.0, y_m, 0.0);
+            Hypothesis { name: name.into(), pieces: vec![Piece { from_s: 31.0, world_from_true }] }
+        };
+        let new = Truth { hypotheses: vec![moved("here", 50.0), moved("there", 90.0)], ..truth() };
+        assert_eq!(Reference::new(rows, &new).mass_true, [1.0; 4]);
     }
 }

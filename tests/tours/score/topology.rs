@@ -84,6 +84,18 @@ impl Layout {
     }
 }
 
+/// Whether a hypothesis asks for no other graph than the truth does, until then: each loop that either
+/// requires is the same to the other. Before ways part it does, and where the robot is in one or another
+/// of two places that are both new. Places are a metre apart.
+pub fn is_as_true(hypothesis: &Hypothesis, truth: &Truth, until_s: f64) -> bool {
+    let Some(what_is) = truth.hypotheses.first() else { return false };
+    let stamps_s = truth.path.each_m(1.0, until_s);
+    let [a, b] = [what_is, hypothesis].map(|h| Layout::new(h, truth, &stamps_s));
+    let between = |layout: &Layout, (i, j): (usize, usize)| layout.poses[i][0].between(&layout.poses[j][0]);
+    let mut pairs = a.loops.iter().chain(&b.loops).flat_map(|l| [l.first, l.last]);
+    pairs.all(|pair| is_right(&between(&a, pair), &between(&b, pair)))
+}
+
 fn is_right(got: &Pose2, want: &Pose2) -> bool {
     got.distance_m(want) <= RIGHT_M && got.between(want).yaw_rad.abs() <= RIGHT_RAD
 }
