@@ -12,7 +12,7 @@ use std::f64::consts::TAU;
 use toponym_proto::Pose;
 
 /// Longer stretches on dark floor are crossings: where one comes out must be told by other means.
-const CROSSING_S: f64 = 8.0;
+const CROSSING_M: f64 = 5.0;
 /// Hypotheses are no more than these.
 const HYPOTHESES_MAX: usize = 6;
 /// Rays differ if they differ by this.
@@ -115,7 +115,7 @@ impl Design {
         let (drive, second_day_s) = driven(&self.world, &self.days, &motion, &mut draw);
         let blind_s = blind(&self.world, &drive);
         let mut starts_s: Vec<(f64, f64)> =
-            blind_s.iter().copied().filter(|(from, to)| to - from > CROSSING_S).collect();
+            blind_s.iter().copied().filter(|s| is_crossing(&drive, *s)).collect();
         starts_s.extend(second_day_s.map(|t_s| (t_s, t_s)));
         let hypotheses = hypotheses(&self.returns, &starts_s);
         let look = |roughness: f64| {
@@ -191,6 +191,13 @@ fn blind(world: &World, drive: &Drive) -> Vec<(f64, f64)> {
         open = dark;
     }
     stretches
+}
+
+/// Whether a dark stretch is more than a doorway.
+pub(super) fn is_crossing(drive: &Drive, (from_s, to_s): (f64, f64)) -> bool {
+    let steps = [from_s, to_s].map(|t_s| (t_s / STEP_S).round() as usize);
+    let poses = drive.poses[steps[0]..=steps[1]].to_vec();
+    Drive { poses }.path_m() > CROSSING_M
 }
 
 /// Every combination of what the returns may have led to, the truth first.
@@ -287,7 +294,8 @@ impl Tour {
         let first_s = hypothesis.pieces.first()?.from_s;
         let laser = self.scenario.lasers.first()?;
         let scans = crate::ticks(self.drive.duration_s(), laser.rate_hz).skip_while(|t_s| *t_s < first_s);
-        scans.into_iter().find(|&t_s| {
+        let mut lit = scans.filter(|t_s| !self.blind_s.iter().any(|(from, to)| (*from..=*to).contains(t_s)));
+        lit.find(|&t_s| {
             let here = self.drive.at(t_s);
             let seen = laser.ranges_m(&self.scenario.world, &here);
             let there = laser.ranges_m(&self.scenario.world, &hypothesis.at(t_s, &here));

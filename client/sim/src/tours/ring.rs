@@ -40,7 +40,8 @@ struct Side {
 
 impl Side {
     fn draw(draw: &mut Draw) -> Self {
-        let (hub_m, wide_m) = (draw.within((3.0, 3.8)), draw.within((1.9, 2.3)));
+        // So large that no way from corridor to corridor is seen across it.
+        let (hub_m, wide_m) = (draw.within((3.6, 4.2)), draw.within((1.9, 2.3)));
         let half_m = hub_m + WALL_M + wide_m;
         let wall = draw.within((-0.2, 0.2)) * half_m;
         let doors = [
@@ -68,7 +69,7 @@ impl Side {
         plan.door([a, -h], [a, outer], 1.1);
         plan.door([b, -h], [b, outer], 1.1);
         // Glare in the doorway: nobody sees in from outside.
-        plan.dark(Rect::new([b - 0.6, outer], [b + 0.6, -h]));
+        plan.dark(Rect::new([b - 0.6, outer + WALL_M / 4.0], [b + 0.6, -h - WALL_M / 4.0]));
         for (room, odd) in [(1, false), (2, odd)] {
             let mut draw = Draw::new(self.furnished + u64::from(odd), room as u64);
             for _ in 0..pieces(1.3, &plan.rooms[room].1).max(4) {
@@ -117,7 +118,7 @@ fn design(name: &str, seed: u64, rounds: usize) -> Result<Design, SimError> {
     }
     let mut hub = Plan::default();
     hub.room("", Rect::new([-side.hub_m, -side.hub_m], [side.hub_m, side.hub_m]));
-    let dark_m = side.hub_m + WALL_M;
+    let dark_m = side.hub_m + WALL_M / 2.0;
     hub.dark(Rect::new([-dark_m, -dark_m], [dark_m, dark_m]));
     plan.stamp(&hub, &Quarter::default(), |_| String::new());
     let world = plan.build();

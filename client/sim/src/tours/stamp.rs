@@ -73,13 +73,6 @@ impl Plan {
         );
         first
     }
-
-    /// The whole plan moved.
-    pub(super) fn moved(&self, by: &Quarter) -> Plan {
-        let mut moved = Plan::default();
-        moved.stamp(self, by, |k| self.rooms[k].0.clone());
-        moved
-    }
 }
 
 /// A point moved by a pose, for tests and questions.

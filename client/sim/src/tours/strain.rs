@@ -30,12 +30,12 @@ fn steps(drive: &Drive, (from_s, to_s): (f64, f64)) -> Vec<Step> {
 
 /// What the laser leaves unknown of the wheels' own errors, having watched them on the lit
 /// stretches: σ of the scale, and the root of the covariance of turn error and bias, `[a 0; b c]`.
-struct Calibrated {
-    scale: f64,
-    turn_bias: [f64; 3],
+pub(super) struct Calibrated {
+    pub scale: f64,
+    pub turn_bias: [f64; 3],
 }
 
-fn calibrated(drive: &Drive, blind_s: &[(f64, f64)], prior: &WheelsPrior) -> Calibrated {
+pub(super) fn calibrated(drive: &Drive, blind_s: &[(f64, f64)], prior: &WheelsPrior) -> Calibrated {
     let mut scale = prior.scale.powi(-2);
     let mut info = [prior.turn.powi(-2), 0.0, prior.yaw_bias_rad_per_m.powi(-2)];
     for (k, step) in steps(drive, (0.0, drive.duration_s())).iter().enumerate() {

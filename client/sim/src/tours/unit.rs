@@ -8,6 +8,8 @@ use crate::world::Plan;
 
 /// Thickness of a wall.
 pub(super) const WALL_M: f64 = 0.2;
+/// Suites drawn until in one of them no furniture bars a way.
+const DRAWS: usize = 50;
 /// Pieces of furniture per 10 m².
 const CLUTTER: f64 = 1.3;
 
@@ -40,8 +42,23 @@ pub(super) struct Unit {
 }
 
 impl Unit {
-    /// Draws a suite.
+    /// Draws a suite whose furniture bars no way.
     pub fn draw(style: &Style, draw: &mut Draw) -> Self {
+        for _ in 0..DRAWS {
+            let unit = Self::drawn(style, draw);
+            let world = unit.plan.clone().build();
+            let door = world.waypoint_near([unit.door[0], -0.8]);
+            let last = unit.annex.map_or(door, |[x, y]| world.waypoint_near([x, y + 0.8]));
+            let reached = |to| world.route(door, to).is_some();
+            if world.rooms.iter().map(|r| r.spot).chain([last]).all(reached) {
+                return unit;
+            }
+        }
+        // The tour will say that there is no way.
+        Self::drawn(style, draw)
+    }
+
+    fn drawn(style: &Style, draw: &mut Draw) -> Self {
         let mut plan = Plan::default();
         let width_m = draw.within(style.width_m);
         let front_m = draw.within(style.front_m);
@@ -52,6 +69,9 @@ impl Unit {
             Some(hall_m) => halls(&mut plan, style, [width_m, front_m, draw.within(hall_m)], draw),
             None => back(&mut plan, [width_m, front_m, draw.within(style.back_m)], draw),
         };
+        let annex = style.annex.then(|| [draw.within((0.3, 0.7)) * width_m, -inner_m]);
+        // Furniture keeps clear of that door, too.
+        plan.waypoints.extend(annex.map(|[x, y]| [x, y + 0.8]));
         for k in 0..plan.rooms.len() {
             if style.hall_m.is_some() && k == 1 {
                 continue;
@@ -60,22 +80,8 @@ impl Unit {
                 furnish_once(&mut plan, k, draw);
             }
         }
-        let annex = style.annex.then(|| [draw.within((0.3, 0.7)) * width_m, -inner_m]);
         let annex_name = plan.rooms.len();
-        let mut unit = Self { plan, width_m, door: [door_x, WALL_M], annex, annex_name };
-        if let Some([x, y]) = annex {
-            unit.plan.waypoints.push([x, y + 0.8]);
-            unit.clear([x, y + 0.8]);
-        }
-        unit
-    }
-
-    /// Takes away furniture, drawn before the door to the annex, that stands before it.
-    fn clear(&mut self, door: Point) {
-        let near = |s: &crate::geom::Segment| s.distance_m(door) < 0.7;
-        let blocks: Vec<_> =
-            self.plan.furniture.chunks(4).filter(|b| !b.iter().any(near)).flatten().copied().collect();
-        self.plan.furniture = blocks;
+        Self { plan, width_m, door: [door_x, WALL_M], annex, annex_name }
     }
 
     /// Index of the back room.
@@ -99,7 +105,7 @@ impl Unit {
             plan.room("", Rect::new([0.0, wall - deep_m], [self.width_m, wall]));
             plan.door([x, y], [x, wall], 1.1);
             // Glare in the doorway: nobody sees in from outside.
-            plan.dark(Rect::new([x - 0.6, wall], [x + 0.6, y]));
+            plan.dark(Rect::new([x - 0.6, wall + WALL_M / 4.0], [x + 0.6, y - WALL_M / 4.0]));
             let k = plan.rooms.len() - 1;
             for _ in 0..pieces(CLUTTER, &plan.rooms[k].1).max(4) {
                 furnish_once(&mut plan, k, draw);

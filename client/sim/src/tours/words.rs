@@ -120,7 +120,13 @@ fn here(tour: &Tour, stays: &[Visit]) -> Vec<Thought> {
             at_s = until_s + 0.5;
         }
         let epoch = tour.returns_s.iter().filter(|r| **r <= at_s).count();
-        let before = &named[stay.room];
+        // Corridors of one name are one to whoever walks them.
+        let corridor = rooms[stay.room].kind == RoomKind::Corridor;
+        let same = |k: usize| {
+            corridor && rooms[k].kind == RoomKind::Corridor && rooms[k].name == rooms[stay.room].name
+        };
+        let one = (0..rooms.len()).find(|&k| same(k)).unwrap_or(stay.room);
+        let before = &named[one];
         let due = if tour.returns_s.is_empty() { before.len() < 2 } else { !before.contains(&epoch) };
         let name = &rooms[stay.room].name;
         if !due || name.is_empty() || at_s > stay.to_s - 0.5 || stay.to_s - stay.from_s < STAY_S {
@@ -133,7 +139,7 @@ fn here(tour: &Tour, stays: &[Visit]) -> Vec<Thought> {
             (true, true) if rooms[stay.room].kind == RoomKind::Room => Form::Another,
             (true, _) => Form::This,
         };
-        named[stay.room].push(epoch);
+        named[one].push(epoch);
         thoughts.push(Thought { at_s, visit, room: stay.room, form });
     }
     thoughts
