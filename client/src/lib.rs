@@ -1,12 +1,12 @@
 //! # toponym
 //!
-//! Client library of the toponym mapping server: three roles over Zenoh, readers of recorded
-//! logs, and a simulator.
+//! Client library of the toponym mapping server: three roles over Zenoh, and readers of
+//! recorded logs.
 //!
 //! - [`Robot`] streams odometry and scans and knows what the server has taken in;
 //! - [`Guide`] says what places are called and hears what became of it;
 //! - [`Planner`] asks where places are;
-//! - [`log`] reads recorded robots, [`sim`] makes up new ones.
+//! - [`log`] reads recorded robots.
 //!
 //! ```no_run
 //! # async fn f() -> Result<(), toponym::ClientError> {
@@ -26,7 +26,6 @@ pub mod planner;
 pub mod replay;
 pub mod robot;
 pub mod session;
-pub mod sim;
 
 #[cfg(test)]
 mod network_tests;

@@ -12,7 +12,6 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::sync::broadcast::Receiver;
 use tokio::time::{Instant, sleep_until, timeout};
-use toponym::sim::{Recording, Scenario};
 use toponym::{Guide, Planner, Robot, RobotConfig};
 use toponym_core::Pose2;
 use toponym_core::answers::query::{EdgeView, GraphAnswer, Grid, ParticleView, PlaceView};
@@ -21,6 +20,7 @@ use toponym_proto::answer::{Candidate, GraphReply, GridReply, Heard, WhereReply}
 use toponym_proto::keys::DEFAULT_SITE;
 use toponym_proto::merge::order_stamp;
 use toponym_proto::{Clock, Message, Pose};
+use toponym_sim::{Recording, Scenario};
 use tracing_subscriber::EnvFilter;
 use zenoh::Session;
 
@@ -222,6 +222,7 @@ fn graph(reply: GraphReply) -> GraphAnswer {
         count: p.count,
         weight: p.weight,
         edges: p.edges.into_iter().map(edge).collect(),
+        poses: Vec::new(),
     });
     GraphAnswer {
         epoch: reply.map.epoch,
@@ -236,9 +237,9 @@ fn graph(reply: GraphReply) -> GraphAnswer {
 async fn stay(endpoint: &str) -> Result<()> {
     println!("\nThe server stays up until ctrl-c. In another terminal, try:");
     println!("  export TOPONYM_CONNECT={endpoint}");
-    println!("  cargo run --release -p toponym -- where library");
-    println!("  cargo run --release -p toponym -- say \"this is the dining room\"");
-    println!("  cargo run --release -p toponym -- labels");
+    println!("  cargo run --release -p toponym-cli -- where library");
+    println!("  cargo run --release -p toponym-cli -- say \"this is the dining room\"");
+    println!("  cargo run --release -p toponym-cli -- labels");
     std::io::stdout().flush()?;
     Ok(tokio::signal::ctrl_c().await?)
 }

@@ -57,6 +57,8 @@ pub struct Particle {
     pub weight: f64,
     /// Its loop edges.
     pub edges: Vec<Edge>,
+    /// `[x, y, yaw]` of each place in this graph's own map, in the order of `places`.
+    pub poses: Vec<[f64; 3]>,
 }
 
 /// A loop edge: place j in the frame of place i.
@@ -208,7 +210,8 @@ fn particle(p: &toponym_core::answers::query::ParticleView) -> Particle {
         dy_m: e.i_from_j.y_m,
         dyaw_rad: e.i_from_j.yaw_rad,
     });
-    Particle { count: p.count, weight: p.weight, edges: edges.collect() }
+    let poses = p.poses.iter().map(|p| [p.x_m, p.y_m, p.yaw_rad]);
+    Particle { count: p.count, weight: p.weight, edges: edges.collect(), poses: poses.collect() }
 }
 
 fn answer(a: WhereAnswer, robot: &str) -> Answer {

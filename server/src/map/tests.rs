@@ -4,7 +4,7 @@ use super::*;
 use clap::Parser;
 use serde_json::Value;
 use std::path::PathBuf;
-use toponym::sim::{Scenario, write::write_folder};
+use toponym_sim::{Scenario, write::write_folder};
 
 #[derive(Parser)]
 struct Cli {
@@ -78,6 +78,7 @@ fn the_report_has_what_it_should() {
     let report = folder.report("r.json");
     let weights = report["particles"].as_array().unwrap().iter().map(|p| p["weight"].as_f64().unwrap());
     assert!((weights.sum::<f64>() - 1.0).abs() < 1e-9);
+    poses_are_those_of_the_places(&report);
     let answer = &report["answers"][0];
     let mass = answer["candidates"].as_array().unwrap().iter().map(|c| c["probability"].as_f64().unwrap());
     assert!((mass.sum::<f64>() + answer["p_none"].as_f64().unwrap() - 1.0).abs() < 1e-9);
@@ -93,6 +94,17 @@ fn the_report_has_what_it_should() {
     let told: Vec<&str> = rows.lines().filter_map(|l| l.split(' ').next()).collect();
     assert_eq!(told, stamps);
     assert!(std::fs::read(folder.0.join("m.png")).unwrap().starts_with(b"\x89PNG"));
+}
+
+/// Each graph has a pose for every place, and the best one's are the places'.
+fn poses_are_those_of_the_places(report: &Value) {
+    let places = report["places"].as_array().unwrap();
+    for particle in report["particles"].as_array().unwrap() {
+        assert_eq!(particle["poses"].as_array().unwrap().len(), places.len());
+    }
+    for (place, pose) in places.iter().zip(report["particles"][0]["poses"].as_array().unwrap()) {
+        assert_eq!([&place["x_m"], &place["y_m"], &place["yaw_rad"]], [&pose[0], &pose[1], &pose[2]]);
+    }
 }
 
 #[test]

@@ -121,6 +121,9 @@ pub struct ParticleView {
     pub weight: f64,
     /// Its loop edges.
     pub edges: Vec<EdgeView>,
+    /// Poses of all places, open ones too, in its own map; in the order of the answer's places.
+    /// Empty in what came over the network.
+    pub poses: Vec<Pose2>,
 }
 
 /// The posterior's graphs; `places` in the best one.

@@ -52,9 +52,7 @@ impl Snapshot {
         (epoch, rev): (u64, u64),
     ) -> Self {
         let places = filter.graph.places().to_vec();
-        let best = filter.best();
-        let mut poses = best.belief.poses();
-        poses.extend(open_poses(best, &places, &open));
+        let poses = poses(filter.best(), &places, &open);
         let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
         Self { places, open, structure, particles, poses, ledger, robot, epoch, rev }
     }
@@ -108,30 +106,27 @@ impl Snapshot {
                 labels: self.names_of(v as Vertex),
             })
             .collect();
-        let particles = self
-            .particles
-            .iter()
-            .map(|p| ParticleView {
-                count: p.count,
-                weight: p.weight(),
-                edges: p
-                    .edges
-                    .iter()
-                    .map(|e| EdgeView {
-                        i: PlaceId::from(e.i),
-                        j: PlaceId::from(e.j),
-                        kind: e.kind,
-                        i_from_j: e.i_from_j,
-                    })
-                    .collect(),
-            })
-            .collect();
         GraphAnswer {
             epoch: self.epoch,
             rev: self.rev,
             places,
-            particles,
+            particles: self.particles.iter().map(|p| self.particle(p)).collect(),
             effective_sample_size: effective_sample_size(&self.particles),
+        }
+    }
+
+    fn particle(&self, p: &Particle) -> ParticleView {
+        let edges = p.edges.iter().map(|e| EdgeView {
+            i: PlaceId::from(e.i),
+            j: PlaceId::from(e.j),
+            kind: e.kind,
+            i_from_j: e.i_from_j,
+        });
+        ParticleView {
+            count: p.count,
+            weight: p.weight(),
+            edges: edges.collect(),
+            poses: poses(p, &self.places, &self.open),
         }
     }
 
@@ -280,6 +275,13 @@ impl Snapshot {
         }
         ids
     }
+}
+
+/// Poses of all places, open ones too, in a particle's map.
+fn poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> {
+    let mut poses = p.belief.poses();
+    poses.extend(open_poses(p, places, open));
+    poses
 }
 
 /// Covariance of a right perturbation as that of (x, y, yaw) along the map's axes.

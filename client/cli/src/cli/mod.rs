@@ -1,0 +1,176 @@
+//! The command line: arguments, exit codes, and one function per command.
+
+mod find;
+mod mend;
+mod play;
+mod talk;
+
+use clap::{Parser, Subcommand};
+use std::process::ExitCode;
+use toponym::ClientError;
+use toponym_proto::keys::DEFAULT_SITE;
+use toponym_sim::args::SimulateArgs;
+
+/// Exit codes.
+pub mod exit {
+    /// It was found, said, played.
+    pub const FOUND: u8 = 0;
+    /// The name is not known, the sentence was not understood.
+    pub const NOT_KNOWN: u8 = 1;
+    /// Wrong arguments or input files.
+    pub const USAGE: u8 = 2;
+    /// Nobody answers.
+    pub const NO_SERVER: u8 = 3;
+    /// The answer did not come in time.
+    pub const TIMEOUT: u8 = 4;
+    /// The server said no.
+    pub const REFUSED: u8 = 5;
+}
+
+/// Talk to a toponym mapping server.
+///
+/// Robots send it what they see, people tell it what places are called, and it answers where
+/// the kitchen is.
+#[derive(Debug, Parser)]
+#[command(
+    name = "toponym",
+    version,
+    after_help = "\
+Try, with `toponym-server serve` running in another terminal:
+  toponym simulate tour                          make a log of a simulated robot
+  toponym simulate tour2 --plan FILE.xml --lidar rplidar --wheels rough --people 5
+  toponym replay tour/sim.clf --narration tour/narration.jsonl --speed 20
+  toponym labels                                 what was it told?
+  toponym where kitchen                          how far, which way, how sure?
+  toponym say 'this is the workshop'             teach it another name
+
+Exit codes: 0 found, 1 not known, 2 usage, 3 no server, 4 timeout, 5 refused."
+)]
+pub struct Args {
+    /// Where the server listens [env: TOPONYM_CONNECT] [default: tcp/127.0.0.1:7457].
+    #[arg(long, global = true, value_name = "ENDPOINT")]
+    connect: Option<String>,
+    /// Site, the second part of every key.
+    #[arg(long, global = true, default_value = DEFAULT_SITE)]
+    site: String,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Tell a robot what a place is called.
+    Say(talk::SayArgs),
+    /// Ask where a place is.
+    Where(find::WhereArgs),
+    /// List all names taught so far.
+    Labels(find::LabelsArgs),
+    /// Take a sentence back.
+    Undo(mend::UndoArgs),
+    /// Give a misheard name its right spelling.
+    Rename(mend::RenameArgs),
+    /// Forget a name.
+    Forget(mend::ForgetArgs),
+    /// Play a recorded log to the server, as robot and guide.
+    Replay(play::ReplayArgs),
+    Simulate(SimulateArgs),
+}
+
+/// Why a command failed.
+#[derive(Debug, thiserror::Error)]
+enum Failure {
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    #[error(transparent)]
+    Log(#[from] toponym::log::LogError),
+    #[error(transparent)]
+    Narration(#[from] toponym::log::NarrationError),
+    #[error(transparent)]
+    Simulate(#[from] toponym_sim::args::SimulateError),
+    #[error("DATA LOSS: the server gave up {0} messages; see its log")]
+    Lost(u64),
+    #[error("output: {0}")]
+    Output(#[from] std::io::Error),
+}
+
+impl Failure {
+    fn code(&self) -> u8 {
+        match self {
+            Self::Client(ClientError::NoServer { .. } | ClientError::Zenoh(_)) => exit::NO_SERVER,
+            Self::Client(ClientError::Timeout { .. }) => exit::TIMEOUT,
+            Self::Client(ClientError::Refused(_) | ClientError::Unreadable { .. }) | Self::Lost(_) => {
+                exit::REFUSED
+            }
+            Self::Client(ClientError::Invalid(_))
+            | Self::Log(_)
+            | Self::Narration(_)
+            | Self::Simulate(_)
+            | Self::Output(_) => exit::USAGE,
+        }
+    }
+}
+
+/// Runs a command; errors go to standard error.
+pub async fn run(args: Args) -> ExitCode {
+    let endpoint = toponym::endpoint(args.connect.as_deref());
+    let done = match &args.command {
+        Command::Say(say) => talk::say(&endpoint, &args.site, say).await,
+        Command::Where(asked) => find::find(&endpoint, &args.site, asked).await,
+        Command::Labels(asked) => find::labels(&endpoint, &args.site, asked).await,
+        Command::Undo(undo) => mend::undo(&endpoint, &args.site, undo).await,
+        Command::Rename(rename) => mend::rename(&endpoint, &args.site, rename).await,
+        Command::Forget(forget) => mend::forget(&endpoint, &args.site, forget).await,
+        Command::Replay(replay) => play::replay(&endpoint, &args.site, replay).await,
+        Command::Simulate(simulate) => simulated(simulate),
+    };
+    ExitCode::from(done.unwrap_or_else(|failure| {
+        eprintln!("error: {failure}");
+        failure.code()
+    }))
+}
+
+fn simulated(args: &SimulateArgs) -> Result<u8, Failure> {
+    println!("{}", toponym_sim::args::run(args)?);
+    Ok(exit::FOUND)
+}
+
+/// Seconds to wait, as an argument.
+fn seconds(text: &str) -> Result<std::time::Duration, String> {
+    let s: f64 = text.parse().map_err(|_| format!("{text:?} is not a number"))?;
+    std::time::Duration::try_from_secs_f64(s).map_err(|e| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+    use std::time::Duration;
+    use toponym_proto::answer::{ErrorCode, Problem};
+
+    #[test]
+    fn the_arguments_are_sound() {
+        Args::command().debug_assert();
+    }
+
+    #[test]
+    fn failures_have_the_documented_exit_codes() {
+        let refused = Problem::new(ErrorCode::MapTaken, "taken");
+        let timeout = ClientError::Timeout { what: "a".into(), after: Duration::ZERO };
+        let nobody = ClientError::NoServer { endpoint: "a".into(), why: "b".into() };
+        let invalid = toponym_proto::Invalid::new("text", "is empty");
+        for (error, code) in [
+            (ClientError::Invalid(invalid), 2),
+            (nobody, 3),
+            (timeout, 4),
+            (ClientError::Refused(refused), 5),
+        ] {
+            assert_eq!(Failure::from(error).code(), code);
+        }
+    }
+
+    #[test]
+    fn seconds_are_not_negative() {
+        assert_eq!(seconds("1.5"), Ok(Duration::from_millis(1500)));
+        assert!(seconds("-1").is_err() && seconds("soon").is_err() && seconds("nan").is_err());
+    }
+}

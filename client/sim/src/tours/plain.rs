@@ -1,0 +1,110 @@
+//! Buildings without look-alikes, and one that is its own half turn.
+
+use super::Tour;
+use super::design::{Design, Walk};
+use super::stamp::Quarter;
+use super::unit::WALL_M;
+use super::words::Names;
+use crate::building::{furnish_once, pieces};
+use crate::geom::Rect;
+use crate::random::Draw;
+use crate::world::Plan;
+use crate::{Fault, OfficeStyle, Scenario, SimError};
+use toponym_proto::Pose;
+
+/// Rooms on a tour of an office.
+const STOPS: usize = 9;
+/// The guide says nothing for so long on the second day.
+const LATE_M: f64 = 14.0;
+
+/// An office and what goes wrong in it: `clean`, `slip`, `unsigned`, `break`.
+pub(super) fn office(name: &'static str, seed: u64) -> Result<Tour, SimError> {
+    let mut draw = Draw::new(seed, 4);
+    let scenario = Scenario::office(&OfficeStyle::default(), STOPS, seed);
+    let tour = &scenario.tour;
+    let mut walk = Walk::from_room(&scenario.world, *tour.first().ok_or(SimError::NoTour)?)?;
+    for &room in &tour[1..] {
+        walk.to(room)?;
+    }
+    let (start, legs) = (walk.start, walk.legs);
+    let faults = match name {
+        "slip" if draw.chance(0.5) => {
+            let turn = draw.within((40.0, 140.0)).round().to_radians();
+            vec![Fault::SlipTurn { turn_rad: if draw.chance(0.5) { turn } else { -turn } }]
+        }
+        "slip" => vec![Fault::SlipAhead { way_m: (draw.within((1.0, 4.0)) * 10.0).round() / 10.0 }],
+        "unsigned" => vec![Fault::Unsigned],
+        "break" => vec![Fault::Break],
+        _ => Vec::new(),
+    };
+    let design = Design { faults, ..Design::plain(scenario.world, start, legs) };
+    Ok(design.tour(name, seed).0)
+}
+
+/// Half of a ring of corridors with rooms: its half turn makes it whole.
+fn half(length_m: f64, width_m: f64, draw: &mut Draw) -> Plan {
+    let mut plan = Plan::default();
+    let wide_m = draw.within((1.9, 2.5));
+    plan.corridor("", Rect::new([0.0, 0.0], [length_m, wide_m]));
+    plan.corridor("", Rect::new([0.0, 0.0], [wide_m, width_m]));
+    // A lobby to the west, rooms to the south.
+    let high = width_m * draw.within((0.62, 0.7));
+    let low = high - draw.within((4.5, 6.0));
+    plan.room("", Rect::new([-WALL_M - draw.within((4.0, 5.5)), low], [-WALL_M, high]));
+    let y = f64::midpoint(low, high);
+    plan.door([0.0, y], [-WALL_M, y], draw.within((1.2, 2.4)));
+    let mut x = draw.within((0.0, 2.0));
+    let deep_m = draw.within((4.5, 6.5));
+    while length_m - x > 4.0 {
+        let end = (x + draw.within((4.5, 8.0))).min(length_m);
+        plan.room("", Rect::new([x, -WALL_M - deep_m], [end, -WALL_M]));
+        let at = x + draw.within((0.3, 0.7)) * (end - x);
+        plan.door([at, 0.0], [at, -WALL_M], 1.1);
+        x = end + WALL_M;
+    }
+    for k in 2..plan.rooms.len() {
+        for _ in 0..pieces(1.2, &plan.rooms[k].1).max(3) {
+            furnish_once(&mut plan, k, draw);
+        }
+    }
+    plan
+}
+
+/// A second day that starts anywhere in a building that is its own half turn: `start`.
+pub(super) fn start(name: &'static str, seed: u64) -> Result<Tour, SimError> {
+    let mut draw = Draw::new(seed, 4);
+    let (length_m, width_m) = (draw.within((20.0, 28.0)), draw.within((12.0, 16.0)));
+    let half = half(length_m, width_m, &mut draw);
+    let mut names = Names::new(&mut draw);
+    let turn = Quarter { turns: 2, by_m: [length_m, width_m] };
+    let mut plan = Plan::default();
+    for at in [Quarter::default(), turn] {
+        let named: Vec<String> = (0..half.rooms.len())
+            .map(|k| match k {
+                0 | 1 => "hallway".to_owned(),
+                2 => "elevator lobby".to_owned(),
+                _ => names.next().to_owned(),
+            })
+            .collect();
+        plan.stamp(&half, &at, |k| named[k].clone());
+    }
+    let world = plan.build();
+    let half_rooms = half.rooms.len();
+    let rooms: Vec<usize> = (0..world.rooms.len()).filter(|k| k % half_rooms >= 2).collect();
+    let from = draw.below(rooms.len());
+    let mut first = Walk::from_room(&world, rooms[from])?;
+    // Every room once, each half in its order: round the ring.
+    for k in 1..=rooms.len() {
+        first.to(rooms[(from + k) % rooms.len()])?;
+    }
+    // Spots, doors and corridors: all the floor that a route leads over.
+    let mut second = Walk::from_waypoint(&world, draw.below(world.waypoints.len()));
+    for _ in 0..5 {
+        second.to(rooms[draw.below(rooms.len())])?;
+    }
+    let days = vec![(first.start, first.legs), (second.start, second.legs)];
+    let returns =
+        vec![vec![("as it is".to_owned(), Pose::default()), ("half a turn on".to_owned(), turn.pose())]];
+    let plain = Design::plain(world, [0.0, 0.0], Vec::new());
+    Ok(Design { days, returns, late_m: LATE_M, ..plain }.tour(name, seed).0)
+}
