@@ -5,31 +5,11 @@ use crate::suite::Suite;
 use crate::{simulated, suite};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
-use toponym_core::config::Rules;
+use toponym_server::map::Preset;
 use toponym_sim::tours::Language;
 
 /// Whatever there is of a kind.
 const ALL: &str = "all";
-
-/// Rules by which sentences are taken in.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
-pub enum Preset {
-    /// All that is understood, grounded again as the map grows
-    #[default]
-    Toponym,
-    /// The paper's own
-    Paper,
-}
-
-impl Preset {
-    /// As the mapper takes it.
-    pub fn rules(self) -> Rules {
-        match self {
-            Self::Toponym => Rules::Toponym,
-            Self::Paper => Rules::Paper,
-        }
-    }
-}
 
 /// Map tours whose truth is known and on which one hypothesis is not enough, and score the posterior
 #[derive(Clone, Debug, clap::Parser)]

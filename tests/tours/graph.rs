@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use toponym_core::Pose2;
-use toponym_core::query::{GraphAnswer, WhereAnswer};
+use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
 
 /// The posterior at one moment.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -60,7 +60,7 @@ impl Graphs {
     /// Of a mapper's answer.
     pub fn of(graph: GraphAnswer) -> Self {
         let index: BTreeMap<_, usize> = graph.places.iter().enumerate().map(|(k, p)| (p.id, k)).collect();
-        let edge = |e: &toponym_core::query::EdgeView| {
+        let edge = |e: &toponym_core::answers::query::EdgeView| {
             Some(Edge { i: *index.get(&e.i)?, j: *index.get(&e.j)?, i_from_j: e.i_from_j })
         };
         let particles = graph.particles.into_iter().map(|p| Particle {

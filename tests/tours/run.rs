@@ -6,12 +6,12 @@ use crate::truth::Truth;
 use anyhow::{Context, Result};
 use cpu_time::ThreadTime;
 use std::time::Duration;
-use toponym_core::config::Rules;
 use toponym_core::effects::PlaceId;
 use toponym_core::{Config, Effect, Event, Mapper, Pose2, Query};
 use toponym_proto::Message;
 use toponym_proto::merge::order_stamp;
 use toponym_server::convert;
+use toponym_server::map::Preset;
 
 /// A tour of one seed in one language, ready to be mapped.
 #[derive(Clone, Debug)]
@@ -31,8 +31,8 @@ pub struct Case {
 pub struct Settings {
     /// Particles.
     pub particles: u32,
-    /// By whose rules sentences are taken in.
-    pub rules: Rules,
+    /// How sentences are taken in.
+    pub preset: Preset,
 }
 
 /// Maps on one thread, so that processor time means the same for whoever else is busy.
@@ -53,8 +53,8 @@ struct Run {
 
 impl Run {
     fn new(case: &Case, settings: Settings) -> Self {
-        let Settings { particles, rules } = settings;
-        let config = Config { particles, rules, seed: case.seed, ..Config::default() };
+        let Settings { particles, preset } = settings;
+        let config = preset.config(Config { particles, seed: case.seed, ..Config::default() });
         Self {
             mapper: Mapper::new(config),
             spent: Duration::ZERO,

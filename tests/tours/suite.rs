@@ -93,7 +93,7 @@ impl Suite {
         for &language in &self.languages {
             let Some(case) = tour.case(language) else { continue };
             for &particles in &self.particles {
-                let settings = Settings { particles, rules: self.preset.rules() };
+                let settings = Settings { particles, preset: self.preset };
                 let outcome =
                     Outcome::new(seed, &case.truth, &run::map(&case, settings)?, case.reference.clone());
                 mapped.push(((language, particles), outcome));
@@ -147,7 +147,7 @@ fn spread<T: Sync, R: Send>(threads: usize, items: &[T], work: impl Fn(&T) -> R 
 mod tests {
     use super::*;
     use crate::tour::tests::short_walk;
-    use toponym_core::config::Rules;
+    use toponym_server::map::Preset;
 
     #[test]
     fn results_are_in_the_order_of_the_items() {
@@ -158,7 +158,7 @@ mod tests {
 
     #[test]
     fn the_figures_do_not_depend_on_the_threads_but_on_the_seed() {
-        let settings = Settings { particles: 3, rules: Rules::Toponym };
+        let settings = Settings { particles: 3, preset: Preset::Toponym };
         let outcomes = |threads| {
             spread(threads, &[1, 2], |seed| {
                 let case = short_walk(*seed).case(Language::Simple).unwrap();

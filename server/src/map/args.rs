@@ -98,15 +98,14 @@ impl MapArgs {
     /// The mapper's settings.
     pub fn config(&self) -> Config {
         let defaults = Config::default();
-        Config {
+        self.preset.config(Config {
             particles: self.particles.unwrap_or(defaults.particles),
             seed: self.seed.unwrap_or(defaults.seed),
             language: !self.no_language,
-            rules: self.preset.rules(),
-            semantic_edges: !self.no_semantic_edges && self.preset != Preset::PaperNoLanguage,
+            semantic_edges: !self.no_semantic_edges,
             loops: !self.no_loops,
             ..defaults
-        }
+        })
     }
 
     /// What is spoilt on purpose.
@@ -135,11 +134,13 @@ impl MapArgs {
 }
 
 impl Preset {
-    /// How sentences are taken in.
-    pub fn rules(self) -> Rules {
+    /// These settings with sentences taken in so.
+    #[must_use]
+    pub fn config(self, config: Config) -> Config {
         match self {
-            Self::Toponym => Rules::Toponym,
-            Self::PaperGrounding | Self::PaperNoLanguage => Rules::Paper,
+            Self::Toponym => config,
+            Self::PaperGrounding => Config { rules: Rules::Paper, ..config },
+            Self::PaperNoLanguage => Config { rules: Rules::Paper, semantic_edges: false, ..config },
         }
     }
 }

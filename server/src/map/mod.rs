@@ -11,7 +11,7 @@ mod summary;
 mod timing;
 mod trajectory;
 
-pub use args::MapArgs;
+pub use args::{MapArgs, Preset};
 pub use canvas::Canvas;
 pub use report::build;
 

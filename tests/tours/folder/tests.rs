@@ -5,8 +5,8 @@ use crate::run::{Settings, map};
 use crate::tour::tests::short_walk;
 use clap::Parser;
 use std::path::PathBuf;
-use toponym_core::config::Rules;
 use toponym_server::map::MapArgs;
+use toponym_server::map::Preset;
 use toponym_sim::tours::Language;
 
 #[derive(Parser)]
@@ -69,7 +69,7 @@ fn what_the_servers_map_makes_of_a_folder_scores_as_the_run_itself() {
 
     let (setting, outcomes) = score(&folder.0).unwrap();
     assert_eq!((setting.tour.as_str(), setting.language.as_str()), ("walk", "simple"));
-    let mapped = map(&case, Settings { particles: 4, rules: Rules::Toponym }).unwrap();
+    let mapped = map(&case, Settings { particles: 4, preset: Preset::Toponym }).unwrap();
     let own = Outcome::new(case.seed, &case.truth, &mapped, None);
     assert_eq!(outcomes[0].end(), own.end());
     assert_eq!((outcomes[0].labels, outcomes[0].answers), (own.labels, own.answers));
