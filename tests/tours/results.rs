@@ -1,11 +1,11 @@
 //! The table of all tours, as this repository keeps it.
 
-use crate::args::Preset;
 use crate::score::{Calibration, Summary};
 use crate::suite::Row;
 use crate::table::{number, rate, spread};
 use std::fmt::Write as _;
 use std::time::{SystemTime, UNIX_EPOCH};
+use toponym_server::map::Preset;
 
 /// What stands above the tables.
 const HEAD: &str = "\
@@ -24,7 +24,7 @@ pub fn text(rows: &[Row], seeds: usize, preset: Preset) -> String {
         "Written by `tours --results` on {}: build {}{commit}, {seeds} seeds, preset {}. {HEAD}",
         date(days_since_1970()),
         toponym_server::map::build(),
-        format!("{preset:?}").to_lowercase(),
+        preset,
     );
     out += &section("Which graph", &GRAPHS, &summaries);
     out += &section("The best graph's map, and what is asked of it", &MAPS, &summaries);

@@ -1,6 +1,6 @@
 //! Tours, languages and seeds spread over threads; results in order, whoever was first.
 
-use crate::args::{Preset, skipped};
+use crate::args::skipped;
 use crate::run::{self, Settings};
 use crate::score::{Outcome, Setting};
 use crate::tour::Tour;
@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
+use toponym_server::map::Preset;
 use toponym_sim::tours::Language;
 
 /// What to run.
@@ -107,14 +108,10 @@ impl Suite {
         let row = |kind: (Language, u32)| {
             let outcomes: Vec<Outcome> =
                 seeds.iter().flatten().filter(|m| m.0 == kind).map(|m| m.1.clone()).collect();
-            let preset = match self.preset {
-                Preset::Toponym => "toponym",
-                Preset::Paper => "paper",
-            };
             let setting = Setting {
                 tour: tour.into(),
                 language: kind.0.to_string(),
-                preset: preset.into(),
+                preset: self.preset.to_string(),
                 particles: Some(kind.1),
             };
             (!outcomes.is_empty()).then_some(Row { setting, outcomes })
@@ -207,7 +204,7 @@ mod tests {
             tours: vec!["walk".into()],
             languages: vec![Language::None, Language::Simple],
             particles: vec![2, 1],
-            preset: Preset::Paper,
+            preset: Preset::PaperGrounding,
             seeds: 4..6,
             threads: 1,
             shared: None,
@@ -220,6 +217,9 @@ mod tests {
         let rows = suite.rows("walk", &seeds);
         assert_eq!(rows.iter().map(|r| r.setting.language.as_str()).collect::<Vec<_>>(), ["none", "simple"]);
         assert_eq!(rows[0].outcomes.iter().map(|o| o.seed).collect::<Vec<_>>(), [4, 5]);
-        assert_eq!((rows[0].setting.preset.as_str(), rows[0].setting.particles), ("paper", Some(1)));
+        assert_eq!(
+            (rows[0].setting.preset.as_str(), rows[0].setting.particles),
+            ("paper-grounding", Some(1))
+        );
     }
 }

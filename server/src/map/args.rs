@@ -2,6 +2,8 @@
 
 use super::trajectory::Format;
 use anyhow::{Result, bail};
+use clap::ValueEnum as _;
+use std::fmt;
 use std::path::{Path, PathBuf};
 use toponym_core::config::Rules;
 use toponym_core::trial::{ForcedLoop, Trial};
@@ -130,6 +132,12 @@ impl MapArgs {
             }
         }
         Ok(())
+    }
+}
+
+impl fmt::Display for Preset {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.to_possible_value().map_or(Ok(()), |value| f.write_str(value.get_name()))
     }
 }
 
