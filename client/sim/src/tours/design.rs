@@ -6,13 +6,15 @@ use crate::geom::{Point, between};
 use crate::laser::LaserModel;
 use crate::random::Draw;
 use crate::robot::{STEP_S, drive_legs};
-use crate::world::World;
+use crate::world::{RoomKind, World};
 use crate::{Drive, Fault, Motion, Scenario, SimError, WheelsPrior};
 use std::f64::consts::TAU;
 use toponym_proto::Pose;
 
 /// Longer stretches on dark floor are crossings: where one comes out must be told by other means.
 const CROSSING_M: f64 = 5.0;
+/// One is in a corridor from this far off its walls on: those of suites are narrow.
+const CORRIDOR_M: f64 = 0.4;
 /// Hypotheses are no more than these.
 const HYPOTHESES_MAX: usize = 6;
 /// Rays differ if they differ by this.
@@ -81,8 +83,6 @@ pub(super) struct Design {
     pub returns: Vec<Return>,
     /// After a return the guide says nothing for so long.
     pub late_m: f64,
-    /// Whether something settles it in the end.
-    pub decided: bool,
     /// σ of the wheels' turn error, if not the usual one.
     pub turn: Option<f64>,
     /// Distance of look-alikes to aim at, in standard deviations of the wheels.
@@ -99,7 +99,6 @@ impl Design {
             days: vec![(start, legs)],
             returns: Vec::new(),
             late_m: 0.0,
-            decided: false,
             turn: None,
             aim: 1.0,
             people: 0,
@@ -109,7 +108,10 @@ impl Design {
 
     /// Drives it and finds out what the wheels should be like. Beside the tour: how far the
     /// look-alikes then are at least, in standard deviations.
-    pub fn tour(self, name: &'static str, seed: u64) -> (Tour, f64) {
+    pub fn tour(mut self, name: &'static str, seed: u64) -> (Tour, f64) {
+        for corridor in self.world.rooms.iter_mut().filter(|r| r.kind == RoomKind::Corridor) {
+            corridor.inside_m = corridor.inside_m.min(CORRIDOR_M);
+        }
         let mut draw = Draw::new(seed, 8);
         let motion = Motion { speed_mps: (0.8, 1.0), ..Motion::default() };
         let (drive, second_day_s) = driven(&self.world, &self.days, &motion, &mut draw);
@@ -138,7 +140,7 @@ impl Design {
         vocabulary.extend(super::words::NEVER.map(str::to_owned));
         vocabulary.sort();
         vocabulary.dedup();
-        let mut tour = Tour {
+        let tour = Tour {
             name,
             seed,
             scenario,
@@ -152,9 +154,6 @@ impl Design {
             second_day_s,
             late_m: self.late_m,
         };
-        if self.decided {
-            tour.decisive_s = decisive(&tour);
-        }
         (tour, strain)
     }
 }
@@ -278,7 +277,7 @@ fn laser(draw: &mut Draw) -> LaserModel {
 }
 
 /// The first scan by which every look-alike is refuted.
-fn decisive(tour: &Tour) -> Option<f64> {
+pub(super) fn decisive(tour: &Tour) -> Option<f64> {
     let mut latest_s: Option<f64> = None;
     for hypothesis in &tour.hypotheses[1..] {
         let at_s = tour.refuted_s(hypothesis)?;
