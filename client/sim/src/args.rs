@@ -1,6 +1,9 @@
 //! `toponym simulate`.
 
-use super::{Fault, FloorPlan, LaserModel, OfficeStyle, PlanError, Scenario, SimError, Wheels, write};
+use super::tours::{Language, Tour, tour};
+use super::{
+    Fault, FloorPlan, LaserModel, OfficeStyle, PlanError, Recording, Scenario, SimError, Wheels, tours, write,
+};
 use std::path::PathBuf;
 
 /// Make a log of a simulated robot in a building, with a narration and the truth.
@@ -28,6 +31,17 @@ pub struct SimulateArgs {
     /// largest part that open doors join.
     #[arg(long, value_name = "FILE.xml", conflicts_with = "building")]
     pub plan: Option<PathBuf>,
+    /// Instead, a tour on which more than one place looks the same: small, large, autonomous, twins,
+    /// twins-decided, ring, ring-decided, rows, rows-decided, slip, unsigned, break, start, clean.
+    ///
+    /// It brings its own building, wheels, lasers, people and faults; truth.json tells the
+    /// hypotheses, what really happened first.
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["building", "plan", "stops", "lidar", "fov",
+          "beams", "reach", "yaw", "upside_down", "wheels", "people", "faults"])]
+    pub tour: Option<String>,
+    /// How the guide of a tour speaks: none, simple, complex, false20.
+    #[arg(long, default_value = "simple", requires = "tour")]
+    pub language: Language,
     /// Rooms on the tour of a random office or a plan.
     #[arg(long, default_value_t = 14)]
     pub stops: usize,
@@ -163,10 +177,15 @@ fn scenario(args: &SimulateArgs) -> Result<Scenario, SimulateError> {
 
 /// Runs `toponym simulate`; the text says what was made.
 pub fn run(args: &SimulateArgs) -> Result<String, SimulateError> {
-    let recording = scenario(args)?.run()?;
+    let toured = args.tour.as_deref().map(|name| tour(name, args.seed)).transpose()?;
+    let recording = match &toured {
+        Some(tour) => recorded(tour, args.language)?,
+        None => scenario(args)?.run()?,
+    };
+    let hypotheses = toured.as_ref().map_or(&[][..], |tour| &tour.hypotheses);
     let folder = args.folder.clone();
-    let log =
-        write::write_folder(&recording, &folder).map_err(|source| SimulateError::Write { folder, source })?;
+    let log = write::write_hypotheses(&recording, hypotheses, &folder)
+        .map_err(|source| SimulateError::Write { folder, source })?;
     let minutes = recording.truth.scans.last().map_or(0.0, |(stamp, _)| stamp.seconds() / 60.0);
     Ok(format!(
         "{}: {:.0} m driven in {minutes:.0} min, {} scans, {} rooms named",
@@ -175,6 +194,17 @@ pub fn run(args: &SimulateArgs) -> Result<String, SimulateError> {
         recording.truth.scans.len(),
         recording.truth.names.len()
     ))
+}
+
+/// A tour as one of its languages tells it; the truth's names are those said in it.
+fn recorded(tour: &Tour, language: Language) -> Result<Recording, SimError> {
+    let played = tour.play()?;
+    let said = &played.narration[&language];
+    let messages = tours::messages(&played.stream, said, &tour.scenario.robot);
+    let mut truth = played.truth;
+    let held = |name: &str| said.iter().filter_map(|s| s.claim.as_ref()).any(|c| c.held && c.name == name);
+    truth.names.retain(|(name, _)| held(name));
+    Ok(Recording { messages, truth })
 }
 
 #[cfg(test)]
@@ -239,6 +269,24 @@ mod tests {
         let scans = truth["trajectory"].as_array().unwrap();
         assert!(to_s > from_s + 2.9 && !scans.iter().any(|s| silent(&s[0].as_f64().unwrap())));
         assert!(Cli::try_parse_from(["simulate", "out", "--fault", "smoke"]).is_err());
+    }
+
+    #[test]
+    fn a_tour_is_written_with_its_hypotheses() {
+        let folder = std::env::temp_dir().join(format!("toponym-sim-tour-{}", std::process::id()));
+        let out = folder.display().to_string();
+        let args = ["simulate", out.as_str(), "--tour", "twins", "--language", "complex", "--seed", "2"];
+        run(&Cli::try_parse_from(args).unwrap().simulate).unwrap();
+        let truth = std::fs::read_to_string(folder.join("truth.json")).unwrap();
+        std::fs::remove_dir_all(&folder).unwrap();
+        let truth: serde_json::Value = serde_json::from_str(&truth).unwrap();
+        assert!(truth["hypotheses"][0]["pieces"].as_array().unwrap().is_empty());
+        assert!(truth["hypotheses"][1]["pieces"][0]["from_s"].as_f64().unwrap() > 10.0);
+        let refused =
+            |options: &[&str]| Cli::try_parse_from(["simulate", "out"].iter().chain(options)).is_err();
+        assert!(refused(&["--tour", "twins", "--building", "office"]) && refused(&["--language", "simple"]));
+        let huge = Cli::try_parse_from(["simulate", "out", "--tour", "huge"]).unwrap();
+        assert!(run(&huge.simulate).unwrap_err().to_string().contains("ring-decided"));
     }
 
     #[test]

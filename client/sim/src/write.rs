@@ -2,6 +2,7 @@
 //! the truth to score against.
 
 use super::Recording;
+use super::tours::{Hypothesis, Piece};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::f64::consts::FRAC_PI_2;
@@ -9,7 +10,7 @@ use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
 use toponym_proto::record::RecordWriter;
-use toponym_proto::{Message, Scan};
+use toponym_proto::{Message, Pose, Scan};
 
 /// What CARMEN logs write where nothing was seen.
 const NOTHING_SEEN_M: f32 = 81.83;
@@ -23,6 +24,16 @@ pub const CARMEN: &str = "sim.clf";
 /// `truth.json` and `questions.json` into a folder, which it makes if need be. The answer is the
 /// log to map: the CARMEN one if there is one.
 pub fn write_folder(recording: &Recording, folder: &Path) -> io::Result<&'static str> {
+    write_hypotheses(recording, &[], folder)
+}
+
+/// The same, with what else might have happened in `truth.json`: the robot is at `world_from_true ∘
+/// true pose` from each piece's time on.
+pub fn write_hypotheses(
+    recording: &Recording,
+    hypotheses: &[Hypothesis],
+    folder: &Path,
+) -> io::Result<&'static str> {
     std::fs::create_dir_all(folder)?;
     record(recording, std::fs::File::create(folder.join(RECORD))?)?;
     let log = if fits_carmen(recording) { CARMEN } else { RECORD };
@@ -33,10 +44,21 @@ pub fn write_folder(recording: &Recording, folder: &Path) -> io::Result<&'static
         std::fs::remove_file(folder.join(CARMEN))?;
     }
     std::fs::write(folder.join("narration.jsonl"), narration(recording))?;
-    let (truth, questions) = truth(recording);
+    let (mut truth, questions) = truth(recording);
+    if !hypotheses.is_empty() {
+        truth["hypotheses"] = hypotheses.iter().map(told).collect();
+    }
     std::fs::write(folder.join("truth.json"), format!("{truth}\n"))?;
     std::fs::write(folder.join("questions.json"), format!("{questions:#}\n"))?;
     Ok(log)
+}
+
+fn told(hypothesis: &Hypothesis) -> Value {
+    let piece = |p: &Piece| {
+        let Pose { x_m, y_m, yaw_rad } = p.world_from_true;
+        json!({"from_s": p.from_s, "x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad})
+    };
+    json!({"name": hypothesis.name, "pieces": hypothesis.pieces.iter().map(piece).collect::<Vec<_>>()})
 }
 
 /// Writes the robot's streams as a record file, as `serve --record` does, but without sentences:
@@ -50,20 +72,23 @@ pub fn record(recording: &Recording, out: impl io::Write) -> io::Result<()> {
 }
 
 /// Whether a CARMEN log can say all there is: one laser, half a circle flat ahead on the body's x
-/// axis, all rays at once.
+/// axis, all rays at once, and no second boot.
 pub fn fits_carmen(recording: &Recording) -> bool {
-    recording.messages.iter().all(|message| match message {
-        Message::Setup(setup) => match setup.lasers.as_slice() {
-            [l] => l.y_m == 0.0 && l.yaw_rad == 0.0 && !l.upside_down && l.ignored_rad.is_empty(),
-            _ => false,
-        },
-        Message::Scan(scan) => {
-            let last_rad = scan.angle_min_rad + scan.angle_increment_rad * (scan.ranges_m.len() as f64 - 1.0);
-            let half_circle = (scan.angle_min_rad + FRAC_PI_2).abs().max((last_rad - FRAC_PI_2).abs());
-            scan.time_increment_s == 0.0 && half_circle < 1e-6
-        }
-        Message::Odom(_) | Message::Say(_) | Message::End(_) | Message::Mend(_) => true,
-    })
+    let first_boot = |m: &Message| m.header().is_none_or(|h| h.boot == 0);
+    recording.messages.iter().all(first_boot)
+        && recording.messages.iter().all(|message| match message {
+            Message::Setup(setup) => match setup.lasers.as_slice() {
+                [l] => l.y_m == 0.0 && l.yaw_rad == 0.0 && !l.upside_down && l.ignored_rad.is_empty(),
+                _ => false,
+            },
+            Message::Scan(scan) => {
+                let last_rad =
+                    scan.angle_min_rad + scan.angle_increment_rad * (scan.ranges_m.len() as f64 - 1.0);
+                let half_circle = (scan.angle_min_rad + FRAC_PI_2).abs().max((last_rad - FRAC_PI_2).abs());
+                scan.time_increment_s == 0.0 && half_circle < 1e-6
+            }
+            Message::Odom(_) | Message::Say(_) | Message::End(_) | Message::Mend(_) => true,
+        })
 }
 
 /// The robot's streams as a CARMEN log (ODOM and FLASER lines). The format knows one laser, flat
@@ -71,7 +96,7 @@ pub fn fits_carmen(recording: &Recording) -> bool {
 pub fn carmen(recording: &Recording) -> String {
     let mut text = String::from("# simulated by toponym\n");
     let (mut offset_m, mut front) = (0.0, None);
-    let mut odom = toponym_proto::Pose::default();
+    let mut odom = Pose::default();
     for message in &recording.messages {
         match message {
             Message::Setup(setup) => {
@@ -97,7 +122,7 @@ pub fn carmen(recording: &Recording) -> String {
     text
 }
 
-fn flaser(text: &mut String, scan: &Scan, odom: &toponym_proto::Pose, offset_m: f64) {
+fn flaser(text: &mut String, scan: &Scan, odom: &Pose, offset_m: f64) {
     let _ = write!(text, "FLASER {}", scan.ranges_m.len());
     for &range_m in &scan.ranges_m {
         let range_m = match range_m {

@@ -6,13 +6,15 @@ use crate::geom::{Point, between};
 use crate::laser::LaserModel;
 use crate::random::Draw;
 use crate::robot::{STEP_S, drive_legs};
-use crate::world::World;
+use crate::world::{RoomKind, World};
 use crate::{Drive, Fault, Motion, Scenario, SimError, WheelsPrior};
 use std::f64::consts::TAU;
 use toponym_proto::Pose;
 
 /// Longer stretches on dark floor are crossings: where one comes out must be told by other means.
 const CROSSING_M: f64 = 5.0;
+/// One is in a corridor from this far off its walls on: those of suites are narrow.
+const CORRIDOR_M: f64 = 0.4;
 /// Hypotheses are no more than these.
 const HYPOTHESES_MAX: usize = 6;
 /// Rays differ if they differ by this.
@@ -109,7 +111,10 @@ impl Design {
 
     /// Drives it and finds out what the wheels should be like. Beside the tour: how far the
     /// look-alikes then are at least, in standard deviations.
-    pub fn tour(self, name: &'static str, seed: u64) -> (Tour, f64) {
+    pub fn tour(mut self, name: &'static str, seed: u64) -> (Tour, f64) {
+        for corridor in self.world.rooms.iter_mut().filter(|r| r.kind == RoomKind::Corridor) {
+            corridor.inside_m = corridor.inside_m.min(CORRIDOR_M);
+        }
         let mut draw = Draw::new(seed, 8);
         let motion = Motion { speed_mps: (0.8, 1.0), ..Motion::default() };
         let (drive, second_day_s) = driven(&self.world, &self.days, &motion, &mut draw);

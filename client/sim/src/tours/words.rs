@@ -177,14 +177,20 @@ fn elsewhere(tour: &Tour, stays: &[Visit], thoughts: &mut [Thought], draw: &mut 
         if !first || !(always || chosen) || landmarks.contains(&thought.room) || room.name == "courtyard" {
             continue;
         }
-        let order = if ahead || always { [-1, 1] } else { [1, -1] };
-        let told = order.into_iter().find_map(|way| {
+        // The gym is told of from the hallway, be it some rooms before.
+        let order: &[isize] = match (always, ahead) {
+            (true, _) => &[-1, -2, -3, -4],
+            (_, true) => &[-1, 1],
+            _ => &[1, -1],
+        };
+        let told = order.iter().find_map(|&way| {
             let stay = stays.get(thought.visit.checked_add_signed(way)?)?;
             let mark = &rooms[stay.room];
             let named_s =
                 thoughts.iter().filter(|t| t.room == stay.room).map(|t| t.at_s).fold(f64::INFINITY, f64::min);
             let at_s = (stay.from_s + 2.8).max(named_s + 2.3);
             let fit = stay.room != thought.room
+                && (!always || mark.kind == RoomKind::Corridor)
                 && mark.name != room.name
                 && mark.name != "courtyard"
                 && !moved.contains(&stay.room)
