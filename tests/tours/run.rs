@@ -6,7 +6,7 @@ use crate::truth::Truth;
 use anyhow::{Context, Result};
 use cpu_time::ThreadTime;
 use std::time::Duration;
-use toponym_core::effects::PlaceId;
+use toponym_core::edge::PlaceId;
 use toponym_core::{Config, Effect, Event, Mapper, Pose2, Query};
 use toponym_proto::Message;
 use toponym_proto::merge::order_stamp;
