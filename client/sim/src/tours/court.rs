@@ -157,7 +157,6 @@ fn row_design(name: &'static str, kind: &Kind, larger: f64, seed: u64) -> Result
     let design = Design {
         returns: vec![returns],
         late_m: kind.late_m,
-        decided: kind.style.annex,
         aim,
         people: kind.people,
         ..Design::plain(world, start, legs)

@@ -83,8 +83,6 @@ pub(super) struct Design {
     pub returns: Vec<Return>,
     /// After a return the guide says nothing for so long.
     pub late_m: f64,
-    /// Whether something settles it in the end.
-    pub decided: bool,
     /// σ of the wheels' turn error, if not the usual one.
     pub turn: Option<f64>,
     /// Distance of look-alikes to aim at, in standard deviations of the wheels.
@@ -101,7 +99,6 @@ impl Design {
             days: vec![(start, legs)],
             returns: Vec::new(),
             late_m: 0.0,
-            decided: false,
             turn: None,
             aim: 1.0,
             people: 0,
@@ -143,7 +140,7 @@ impl Design {
         vocabulary.extend(super::words::NEVER.map(str::to_owned));
         vocabulary.sort();
         vocabulary.dedup();
-        let mut tour = Tour {
+        let tour = Tour {
             name,
             seed,
             scenario,
@@ -157,9 +154,6 @@ impl Design {
             second_day_s,
             late_m: self.late_m,
         };
-        if self.decided {
-            tour.decisive_s = decisive(&tour);
-        }
         (tour, strain)
     }
 }
@@ -283,7 +277,7 @@ fn laser(draw: &mut Draw) -> LaserModel {
 }
 
 /// The first scan by which every look-alike is refuted.
-fn decisive(tour: &Tour) -> Option<f64> {
+pub(super) fn decisive(tour: &Tour) -> Option<f64> {
     let mut latest_s: Option<f64> = None;
     for hypothesis in &tour.hypotheses[1..] {
         let at_s = tour.refuted_s(hypothesis)?;

@@ -211,13 +211,17 @@ pub struct Played {
 pub fn tour(name: &str, seed: u64) -> Result<Tour, SimError> {
     let unknown = || SimError::NoSuchTour(name.to_owned(), TOURS.join(", "));
     let name = *TOURS.iter().find(|n| **n == name).ok_or_else(unknown)?;
-    match name {
+    let mut tour = match name {
         "large" => court::large(name, seed),
         "ring" | "ring-decided" => ring::ring(name, seed),
         "start" => plain::start(name, seed),
         "slip" | "unsigned" | "break" | "clean" => plain::office(name, seed),
         _ => court::row(name, seed),
+    }?;
+    if name.ends_with("-decided") {
+        tour.decisive_s = design::decisive(&tour);
     }
+    Ok(tour)
 }
 
 impl Tour {

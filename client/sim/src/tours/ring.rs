@@ -144,7 +144,7 @@ fn design(name: &str, seed: u64, rounds: usize) -> Result<Design, SimError> {
         (0..4).map(|k| (format!("by door {}", (led + k) % 4 + 1), Quarter::turn(k as u8).pose())).collect();
     let aim = draw.within(AIM);
     let plain = Design::plain(world, start, legs);
-    Ok(Design { returns: vec![returns], late_m: LATE_M, decided, turn: Some(TURN), aim, ..plain })
+    Ok(Design { returns: vec![returns], late_m: LATE_M, turn: Some(TURN), aim, ..plain })
 }
 
 /// Round and round the middle from before one side's door to before another's.
