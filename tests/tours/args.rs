@@ -52,7 +52,7 @@ pub struct Args {
     /// One JSON object a line for each tour and language
     #[arg(long)]
     pub json: bool,
-    /// Map nothing: write each seed's log, narration, truth and questions into DIR/SEED
+    /// Besides, write each seed's log, narration, truth and questions into DIR/SEED
     #[arg(long, value_name = "DIR", conflicts_with_all = ["score", "results"])]
     pub write: Option<PathBuf>,
     /// Score the `report.json` and `trajectory.txt` that were put beside what --write wrote

@@ -32,7 +32,7 @@ fn main() -> Result<()> {
     }
     let suite = args.suite()?;
     if let Some(folder) = &args.write {
-        return write(folder, &suite);
+        write(folder, &suite)?;
     }
     let rows = suite.run()?;
     if let Some(file) = &args.results {
@@ -65,7 +65,7 @@ fn write(folder: &Path, suite: &Suite) -> Result<()> {
         let folder = folder.join(seed.to_string());
         folder::write(&folder, name, &language.to_string(), &case)
             .with_context(|| format!("--write {}", folder.display()))?;
-        println!("{}", folder.display());
+        eprintln!("wrote {}", folder.display());
     }
     Ok(())
 }

@@ -14,6 +14,8 @@ use crate::world::Plan;
 const MARGIN_M: f64 = 8.0;
 /// Times that a court is drawn again, larger, for wheels to lose their way on.
 const TRIES: usize = 5;
+/// But never so large that the robot is in the dark for more than 100 m.
+const OUT_MAX_M: f64 = 46.0;
 /// By so much each.
 const LARGER: f64 = 1.12;
 
@@ -44,9 +46,9 @@ fn suite(annex: bool) -> Style {
 fn kind(name: &str) -> Kind {
     let annex = name.ends_with("-decided");
     let court =
-        Kind { style: suite(annex), units: 2, out_m: (32.0, 40.0), late_m: 0.0, people: 0, aim: (0.5, 1.1) };
+        Kind { style: suite(annex), units: 2, out_m: (38.0, 44.0), late_m: 0.0, people: 0, aim: (0.4, 0.95) };
     match name {
-        "autonomous" => Kind { people: 1, ..court },
+        "autonomous" => Kind { people: 1, aim: (0.3, 0.75), ..court },
         "twins" | "twins-decided" => {
             let style = Style { front_m: (4.0, 5.5), hall_m: Some((8.0, 10.0)), sides: 2, ..suite(annex) };
             Kind { style, late_m: 14.0, aim: (0.6, 1.0), ..court }
@@ -116,7 +118,7 @@ fn row_design(name: &'static str, kind: &Kind, larger: f64, seed: u64) -> Result
     let unit = Unit::draw(&kind.style, &mut draw);
     let each_m = unit.width_m + WALL_M;
     let whole_m = each_m * kind.units as f64;
-    let out_m = draw.within(kind.out_m) * larger;
+    let out_m = (draw.within(kind.out_m) * larger).min(OUT_MAX_M);
     let turned = Quarter::turn(draw.below(4) as u8);
     let mut names = named(name, &unit, kind.units, &mut draw);
     // In the middle of three or more, with a neighbour on either side.
@@ -196,7 +198,11 @@ fn first_stops(unit: &Unit, kind: &Kind) -> Vec<usize> {
 
 /// Rooms visited after coming back, which is to the front room.
 fn later_stops(unit: &Unit, kind: &Kind) -> Vec<usize> {
-    let mut stops = if kind.style.hall_m.is_some() { vec![2, unit.back(), 0] } else { vec![1, 0, 1, 0, 1] };
+    let mut stops = if kind.style.hall_m.is_some() {
+        vec![2, unit.back(), 0, 2, unit.back()]
+    } else {
+        vec![1, 0, 1, 0, 1, 0, 1]
+    };
     if kind.style.annex {
         stops.push(unit.annex());
     }
@@ -270,7 +276,7 @@ fn large_design(turns: usize, seed: u64) -> Result<(f64, Design), SimError> {
         let at = turned.after(&at);
         let first = units[unit].put(plan, &at, &names, &mut draw);
         let door = at.point([units[unit].door[0], units[unit].door[1] + 0.8]);
-        Put { at, door, first, back: units[unit].back(), name: label(&[names[3].clone()]) }
+        Put { at, door, first, back: units[unit].back(), name: names[if unit == 1 { 0 } else { 3 }].clone() }
     };
     let south: Vec<Put> = (0..2)
         .map(|k| put(&mut plan, 0, Quarter::shift([3.0 + each(0) * k as f64, 0.0]), &SOUTH[k]))
@@ -305,7 +311,8 @@ fn large_design(turns: usize, seed: u64) -> Result<(f64, Design), SimError> {
     let (start, legs) = (walk.start, walk.legs);
     let alike = |all: &[Put], truth: usize| -> Return {
         let moved = all[1 - truth].at.after(&all[truth].at.inverse()).pose();
-        vec![(all[truth].name.clone(), toponym_proto::Pose::default()), (all[1 - truth].name.clone(), moved)]
+        let name = |k: usize| format!("by {}", all[k].name);
+        vec![(name(truth), toponym_proto::Pose::default()), (name(1 - truth), moved)]
     };
     let sure = || vec![(String::new(), toponym_proto::Pose::default())];
     let aim = draw.within((0.5, 1.1));

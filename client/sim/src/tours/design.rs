@@ -17,6 +17,9 @@ const CROSSING_M: f64 = 5.0;
 const CORRIDOR_M: f64 = 0.4;
 /// Hypotheses are no more than these.
 const HYPOTHESES_MAX: usize = 6;
+/// Wheels of a roughness beyond 1, which is that of [`crate::Wheels::rough`], slip on what lies outdoors: by
+/// up to a quarter more.
+const ROUGHEST: f64 = 1.25;
 /// Rays differ if they differ by this.
 const RAY_M: f64 = 0.1;
 /// A scan is told from another by this many rays.
@@ -250,14 +253,14 @@ fn nearest(
 /// Wheels of such a roughness that look-alikes are as far as aimed at, as far as there are such;
 /// without look-alikes any.
 fn fitted(look: impl Fn(f64) -> (WheelsPrior, f64), aim: f64, draw: &mut Draw) -> (WheelsPrior, f64) {
-    let (rough, nearest) = look(1.0);
+    let (rough, nearest) = look(ROUGHEST);
     if nearest <= 0.0 {
         return look(draw.unit());
     }
     if nearest >= aim {
         return (rough, nearest);
     }
-    let (mut low, mut high) = (0.0, 1.0);
+    let (mut low, mut high) = (0.0, ROUGHEST);
     for _ in 0..8 {
         let middle = f64::midpoint(low, high);
         if look(middle).1 > aim { low = middle } else { high = middle }

@@ -5,15 +5,17 @@ use super::design::{Design, Walk};
 use super::stamp::Quarter;
 use super::unit::WALL_M;
 use super::words::Names;
-use crate::building::{furnish_once, pieces};
+use crate::building::{demo_building, furnish_once, pieces};
 use crate::geom::Rect;
 use crate::random::Draw;
-use crate::world::Plan;
+use crate::world::{Plan, World};
 use crate::{Fault, OfficeStyle, Scenario, SimError};
 use toponym_proto::Pose;
 
-/// Rooms on a tour of an office.
-const STOPS: usize = 9;
+/// Rooms on a tour of an office, and how many of them are visited once more in the end: whatever went wrong on
+/// the way shows there.
+const STOPS: usize = 8;
+const AGAIN: usize = 4;
 /// The guide says nothing for so long on the second day.
 const LATE_M: f64 = 14.0;
 
@@ -23,7 +25,7 @@ pub(super) fn office(name: &'static str, seed: u64) -> Result<Tour, SimError> {
     let scenario = Scenario::office(&OfficeStyle::default(), STOPS, seed);
     let tour = &scenario.tour;
     let mut walk = Walk::from_room(&scenario.world, *tour.first().ok_or(SimError::NoTour)?)?;
-    for &room in &tour[1..] {
+    for &room in tour[1..].iter().chain(tour.iter().take(AGAIN)) {
         walk.to(room)?;
     }
     let (start, legs) = (walk.start, walk.legs);
@@ -70,12 +72,11 @@ fn half(length_m: f64, width_m: f64, draw: &mut Draw) -> Plan {
     plan
 }
 
-/// A second day that starts anywhere in a building that is its own half turn: `start`.
-pub(super) fn start(name: &'static str, seed: u64) -> Result<Tour, SimError> {
-    let mut draw = Draw::new(seed, 4);
+/// A building that is its own half turn, the rooms to stop at in their order round it, and that turn.
+fn half_turned(draw: &mut Draw) -> (World, Vec<usize>, Quarter) {
     let (length_m, width_m) = (draw.within((20.0, 28.0)), draw.within((12.0, 16.0)));
-    let half = half(length_m, width_m, &mut draw);
-    let mut names = Names::new(&mut draw);
+    let half = half(length_m, width_m, draw);
+    let mut names = Names::new(draw);
     let turn = Quarter { turns: 2, by_m: [length_m, width_m] };
     let mut plan = Plan::default();
     for at in [Quarter::default(), turn] {
@@ -88,9 +89,28 @@ pub(super) fn start(name: &'static str, seed: u64) -> Result<Tour, SimError> {
             .collect();
         plan.stamp(&half, &at, |k| named[k].clone());
     }
-    let world = plan.build();
-    let half_rooms = half.rooms.len();
-    let rooms: Vec<usize> = (0..world.rooms.len()).filter(|k| k % half_rooms >= 2).collect();
+    let (world, half_rooms) = (plan.build(), half.rooms.len());
+    let rooms = (0..world.rooms.len()).filter(|k| k % half_rooms >= 2).collect();
+    (world, rooms, turn)
+}
+
+/// The demo's building, of which the lobbies and what one sees of the corridors from many places are their own
+/// half turn, and the rest is not.
+fn demo() -> (World, Vec<usize>, Quarter) {
+    let world = demo_building();
+    let round =
+        ["elevator lobby", "gym", "lecture hall", "mail room", "", "cafe", "library", "workshop", "kitchen"];
+    let other_lobby = world.rooms.iter().rposition(|r| r.name == "elevator lobby");
+    let stop = |name: &&str| if name.is_empty() { other_lobby } else { world.room(name) };
+    let rooms = round.iter().filter_map(stop).collect();
+    (world, rooms, Quarter { turns: 2, by_m: [32.0, 16.2] })
+}
+
+/// A second day that starts anywhere on the first one's map: `start`. In one of two seeds the building is its own
+/// half turn, in the other it is the demo's, which only looks so here and there.
+pub(super) fn start(name: &'static str, seed: u64) -> Result<Tour, SimError> {
+    let mut draw = Draw::new(seed, 4);
+    let (world, rooms, turn) = if draw.chance(0.5) { half_turned(&mut draw) } else { demo() };
     let from = draw.below(rooms.len());
     let mut first = Walk::from_room(&world, rooms[from])?;
     // Every room once, each half in its order: round the ring.

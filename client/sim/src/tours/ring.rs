@@ -134,8 +134,10 @@ fn design(name: &str, seed: u64, rounds: usize) -> Result<Design, SimError> {
     open.extend(circles(home, led, rounds, draw.chance(0.5)));
     open.push(doors(led)[1]);
     walk.across(doors(home)[0], &open, doors(led)[0], firsts[led] + 1)?;
-    walk.to(firsts[(led + 1) % 4] + 1)?;
-    walk.to(firsts[led] + if decided { 1 } else { 2 })?;
+    for k in 1..=4 {
+        walk.to(firsts[(led + k) % 4] + 1)?;
+    }
+    walk.to(firsts[(led + 1) % 4] + if decided { 1 } else { 2 })?;
     if decided {
         walk.to(firsts[odd] + 2)?;
     }
