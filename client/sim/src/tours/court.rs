@@ -34,7 +34,7 @@ struct Kind {
 
 fn suite(annex: bool) -> Style {
     Style {
-        width_m: (4.6, 5.2),
+        width_m: (4.3, 4.9),
         front_m: (6.5, 9.0),
         hall_m: Some((5.5, 8.0)),
         sides: 1,
@@ -308,6 +308,10 @@ fn large_design(turns: usize, seed: u64) -> Result<(f64, Design), SimError> {
         walk.to(into.first + 2)?;
         walk.to(into.first + into.back)?;
     }
+    // So that the last return has room to show.
+    for room in [0, 2, east[last].back] {
+        walk.to(east[last].first + room)?;
+    }
     let (start, legs) = (walk.start, walk.legs);
     let alike = |all: &[Put], truth: usize| -> Return {
         let moved = all[1 - truth].at.after(&all[truth].at.inverse()).pose();
@@ -315,7 +319,7 @@ fn large_design(turns: usize, seed: u64) -> Result<(f64, Design), SimError> {
         vec![(name(truth), toponym_proto::Pose::default()), (name(1 - truth), moved)]
     };
     let sure = || vec![(String::new(), toponym_proto::Pose::default())];
-    let aim = draw.within((0.5, 1.1));
+    let aim = draw.within((0.35, 0.9));
     // To the north; back south; to the east; north again; back east.
     let returns = vec![sure(), alike(&south, led), sure(), sure(), alike(&east, last)];
     Ok((aim, Design { returns, aim, ..Design::plain(world, start, legs) }))
