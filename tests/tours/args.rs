@@ -1,8 +1,7 @@
 //! The command line.
 
-use crate::stata;
 use crate::suite::Suite;
-use crate::{simulated, suite};
+use crate::{plans, simulated, stata, suite};
 use anyhow::{Result, bail};
 use std::path::PathBuf;
 use toponym_server::map::Preset;
@@ -46,7 +45,7 @@ pub struct Args {
     /// The first of them
     #[arg(long, value_name = "S", default_value_t = 1)]
     pub first_seed: u64,
-    /// Where `data/stata` and `peers/stata_tour.py` are, for the tour `stata`
+    /// Where `data/stata` and `peers/stata_tour.py` are, for the tour `stata`, and `data/floorplans`, for `plans`
     #[arg(long, value_name = "DIR")]
     pub shared: Option<PathBuf>,
     /// One JSON object a line for each tour and language
@@ -79,7 +78,7 @@ impl Args {
     }
 
     fn tours(&self) -> Result<Vec<String>> {
-        let known: Vec<&str> = simulated::names().iter().copied().chain([stata::NAME]).collect();
+        let known: Vec<&str> = simulated::names().iter().copied().chain([plans::NAME, stata::NAME]).collect();
         match self.tour.as_deref() {
             None | Some(ALL) => Ok(known.iter().map(|&n| n.to_owned()).collect()),
             Some(name) if known.contains(&name) => Ok(vec![name.to_owned()]),
@@ -102,7 +101,12 @@ impl Args {
 
 /// Why a tour is left out.
 pub fn skipped(tour: &str, suite: &suite::Suite) -> Option<String> {
-    (tour == stata::NAME).then(|| stata::missing(suite.shared.as_deref())).flatten()
+    let shared = suite.shared.as_deref();
+    match tour {
+        stata::NAME => stata::missing(shared),
+        plans::NAME => plans::missing(shared),
+        _ => None,
+    }
 }
 
 #[cfg(test)]
@@ -120,7 +124,7 @@ mod tests {
         Args::command().debug_assert();
         let all = suite(&["--tour", "all", "--language", "all"]).unwrap();
         assert_eq!(all.languages, Language::ALL);
-        assert!(all.tours.contains(&"stata".to_owned()) && all.tours.len() == simulated::names().len() + 1);
+        assert!(all.tours.contains(&"stata".to_owned()) && all.tours.len() == simulated::names().len() + 2);
         assert!(suite(&["--tour", "x", "--language", "all"]).unwrap_err().contains("stata"));
         assert!(suite(&["--tour", "all", "--language", "x"]).unwrap_err().contains("false20"));
         assert!(suite(&["--tour", "all"]).unwrap_err().contains("--language"));

@@ -7,6 +7,7 @@
 mod args;
 mod folder;
 mod graph;
+mod plans;
 mod results;
 mod run;
 mod score;

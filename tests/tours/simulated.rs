@@ -23,19 +23,23 @@ pub fn names() -> &'static [&'static str] {
 
 /// Plays one.
 pub fn tour(name: &str, seed: u64, languages: &[Language]) -> Result<Tour> {
-    let tour = tours::tour(name, seed)?;
+    played(&tours::tour(name, seed)?, languages)
+}
+
+/// Plays one that was made.
+pub fn played(tour: &tours::Tour, languages: &[Language]) -> Result<Tour> {
     let played = tour.play()?;
     let path = path(&played, tour.second_day_s);
     let checkpoints_s = Truth::checkpoints_s(path.span_s());
     let hypotheses: Vec<Hypothesis> = tour.hypotheses.iter().map(hypothesis).collect();
     let spoken = languages.iter().filter_map(|&language| {
         let spoken = spoken(&played, language)?;
-        let reference = reference(&tour, &played, language, &checkpoints_s);
+        let reference = reference(tour, &played, language, &checkpoints_s);
         Some(reference.map(|mass| (language, Spoken { reference: Some(mass), ..spoken })))
     });
     let spoken = spoken.collect::<Result<_>>()?;
     Ok(Tour {
-        seed,
+        seed: tour.seed,
         robot: tour.scenario.robot.clone(),
         path,
         hypotheses,

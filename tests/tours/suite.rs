@@ -4,7 +4,7 @@ use crate::args::skipped;
 use crate::run::{self, Settings};
 use crate::score::{Outcome, Setting};
 use crate::tour::Tour;
-use crate::{simulated, stata};
+use crate::{plans, simulated, stata};
 use anyhow::{Context, Result, bail};
 use std::ops::Range;
 use std::path::PathBuf;
@@ -29,7 +29,7 @@ pub struct Suite {
     pub seeds: Range<u64>,
     /// Tours mapped at once.
     pub threads: usize,
-    /// Where the recorded tour is.
+    /// Where the recorded tour and the floor plans are.
     pub shared: Option<PathBuf>,
 }
 
@@ -75,6 +75,7 @@ impl Suite {
     pub fn tour(&self, name: &str, seed: u64) -> Result<Tour> {
         match self.shared.as_deref() {
             Some(shared) if name == stata::NAME => stata::tour(shared, seed),
+            Some(shared) if name == plans::NAME => plans::tour(shared, seed, &self.languages),
             _ => simulated::tour(name, seed, &self.languages),
         }
     }

@@ -1,9 +1,10 @@
 //! What wheels get wrong beyond noise, and what their reader does.
 
 use super::SimError;
+use super::body::STEP_S;
 use super::geom::{between, compose};
 use super::random::Draw;
-use super::robot::{Drive, STEP_S};
+use super::robot::Drive;
 use std::fmt;
 use std::str::FromStr;
 use toponym_proto::Pose;

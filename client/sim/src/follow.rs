@@ -1,7 +1,7 @@
 //! Driving along a path in curves, as robots do, rather than from corner to corner.
 
+use super::body::{Body, Motion, STEP_S};
 use super::floor::Floor;
-use super::robot::{Body, Motion, STEP_S};
 use crate::geom::{Point, distance_m, wrap};
 use toponym_proto::Pose;
 

@@ -171,8 +171,9 @@ pub(crate) fn visits(world: &World, drive: &Drive) -> Vec<Visit> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::body::Motion;
     use crate::demo_building;
-    use crate::robot::{Motion, drive};
+    use crate::robot::drive;
 
     fn told(style: &GuideStyle) -> (World, Drive, Vec<Sentence>) {
         let world = demo_building();

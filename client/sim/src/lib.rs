@@ -8,6 +8,7 @@
 //! ```
 
 pub mod args;
+mod body;
 mod building;
 mod cast;
 mod doors;
@@ -30,6 +31,7 @@ mod wheels;
 mod world;
 pub mod write;
 
+pub use body::{Motion, STEP_S};
 pub use building::{OfficeStyle, demo_building, random_office};
 pub use cast::Strike;
 pub use fault::{Fault, Incident};
@@ -38,7 +40,7 @@ pub use guide::{GuideStyle, Sentence};
 pub use laser::{LaserModel, Post, Scene, Sweep};
 pub use people::People;
 pub use random::Draw;
-pub use robot::{Drive, Motion, STEP_S};
+pub use robot::Drive;
 pub use storey::Storey;
 pub use wheels::{Wheels, WheelsPrior};
 pub use world::{Plan, Room, RoomKind, Surface, World};

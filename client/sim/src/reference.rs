@@ -34,7 +34,7 @@ mod words;
 #[cfg(test)]
 mod tests;
 
-use super::robot::STEP_S;
+use super::body::STEP_S;
 use super::tours::{Claim, Hypothesis, Piece, Said};
 use super::{Drive, LaserModel, WheelsPrior, World};
 use toponym_proto::{Message, Pose};

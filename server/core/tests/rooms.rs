@@ -42,8 +42,8 @@ const FILES_MAX: usize = 12;
 
 fn sources(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
+    for entry in std::fs::read_dir(folder).expect("the sources are there") {
+        let path = entry.expect("a folder can be read").path();
         if path.is_dir() {
             found.extend(sources(&path));
         } else if path.extension().is_some_and(|e| e == "rs") {
@@ -58,7 +58,7 @@ fn sources(folder: &Path) -> Vec<PathBuf> {
 fn module(src: &Path, file: &Path) -> Vec<String> {
     let mut parts: Vec<String> = file
         .strip_prefix(src)
-        .unwrap()
+        .expect("a source is below src")
         .with_extension("")
         .iter()
         .map(|part| part.to_string_lossy().into_owned())
@@ -156,7 +156,7 @@ fn named(floor: &[&str]) -> BTreeMap<(String, String), String> {
         if !within || module[depth] == "tests" {
             continue;
         }
-        for path in paths(&std::fs::read_to_string(&file).unwrap(), &module) {
+        for path in paths(&std::fs::read_to_string(&file).expect("sources are text"), &module) {
             let here = path.len() > depth && path.iter().zip(floor).all(|(a, b)| a == b);
             if here && path[depth] != module[depth] {
                 named.insert((module[depth].clone(), path[depth].clone()), file.display().to_string());

@@ -12,7 +12,7 @@
 //! moved pose: mountings, posts, dark walls and glass are in both. Rays without information, and
 //! those that something in front of the true wall sends back (legs), say the same under all.
 
-use super::super::robot::STEP_S;
+use super::super::body::STEP_S;
 use super::super::{Draw, Drive, LaserModel, People, Scene};
 use super::{HAIR_S, Hypothesis, Seen, pose};
 use toponym_proto::{Message, Scan};

@@ -13,8 +13,8 @@
 //! a mean motion m and an error of it, m⁻¹ ∘ δ_dark = exp(G (θ − θ̂) + noise).
 
 use super::super::Drive;
+use super::super::body::STEP_S;
 use super::super::geom::{between, compose};
-use super::super::robot::STEP_S;
 use super::plane::{
     Mat3, Vec3, ZERO, add, apply, carried_over, diagonal, inverse, log, log_normal, mul, through, transpose,
 };

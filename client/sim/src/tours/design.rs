@@ -2,10 +2,11 @@
 
 use super::strain::strain;
 use super::{Hypothesis, Piece, Tour};
+use crate::body::STEP_S;
 use crate::geom::{Point, between};
 use crate::laser::LaserModel;
 use crate::random::Draw;
-use crate::robot::{STEP_S, drive_legs};
+use crate::robot::drive_legs;
 use crate::world::{RoomKind, World};
 use crate::{Drive, Fault, Motion, Scenario, SimError, WheelsPrior};
 use std::f64::consts::TAU;

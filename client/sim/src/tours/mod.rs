@@ -24,9 +24,9 @@ mod tests;
 mod unit;
 mod words;
 
+use crate::body::STEP_S;
 use crate::geom::{Point, compose};
-use crate::robot::STEP_S;
-use crate::{Drive, Incident, Scenario, Sentence, SimError, Stream, Truth, WheelsPrior};
+use crate::{Drive, FloorPlan, Incident, Scenario, Sentence, SimError, Stream, Truth, WheelsPrior};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
@@ -222,6 +222,14 @@ pub fn tour(name: &str, seed: u64) -> Result<Tour, SimError> {
         tour.decisive_s = design::decisive(&tour);
     }
     Ok(tour)
+}
+
+/// A tour of a floor plan, without look-alikes or faults.
+///
+/// # Errors
+/// If fewer than two of its rooms are in reach of each other.
+pub fn planned(plan: &FloorPlan, seed: u64) -> Result<Tour, SimError> {
+    plain::plan(plan, seed)
 }
 
 impl Tour {

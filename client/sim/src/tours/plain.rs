@@ -9,7 +9,7 @@ use crate::building::{demo_building, furnish_once, pieces};
 use crate::geom::Rect;
 use crate::random::Draw;
 use crate::world::{Plan, World};
-use crate::{Fault, OfficeStyle, Scenario, SimError};
+use crate::{Fault, FloorPlan, OfficeStyle, Scenario, SimError};
 use toponym_proto::Pose;
 
 /// Rooms on a tour of an office, and how many of them are visited once more in the end: whatever went wrong on
@@ -41,6 +41,18 @@ pub(super) fn office(name: &'static str, seed: u64) -> Result<Tour, SimError> {
     };
     let design = Design { faults, ..Design::plain(scenario.world, start, legs) };
     Ok(design.tour(name, seed).0)
+}
+
+/// A real floor plan, its rooms drawn by chance, some visited once more in the end: `plans`.
+pub(super) fn plan(plan: &FloorPlan, seed: u64) -> Result<Tour, SimError> {
+    let scenario = Scenario::floor_plan(plan, STOPS, seed)?;
+    let tour = &scenario.tour;
+    let mut walk = Walk::from_room(&scenario.world, *tour.first().ok_or(SimError::NoTour)?)?;
+    for &room in tour[1..].iter().chain(tour.iter().take(AGAIN)) {
+        walk.to(room)?;
+    }
+    let (start, legs) = (walk.start, walk.legs);
+    Ok(Design::plain(scenario.world, start, legs).tour("plans", seed).0)
 }
 
 /// Half of a ring of corridors with rooms: its half turn makes it whole.

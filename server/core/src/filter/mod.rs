@@ -85,7 +85,7 @@ impl Filter {
         let proposals = if self.config.loops { self.propose(t) } else { Vec::new() }; // 1. edges e_tj, (5–9)
         let mut measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
         spoil(t, &mut measured);
-        let mut effects = self.weigh_measured(t, measured); // 1–4: G, X, L and w, (10), (17–18)
+        let mut effects = self.weigh_measured(t, &measured); // 1–4: G, X, L and w, (10), (17–18)
         effects.extend(self.look_again()); // the same for a place that was named since it was left
         weigh_overlaps(&self.graph, &self.structure, &mut self.particles, t); // 4. w where nothing fitted, (18)
         normalise(&mut self.particles);
@@ -182,7 +182,7 @@ impl Filter {
         let mut effects = Effects::new();
         for (t, proposal) in second_look::pairs(&self.config, &self.graph, &self.particles, v) {
             let measured = measure_again(&mut self.graph, t, &[proposal]);
-            effects.extend(self.weigh_measured(t, measured));
+            effects.extend(self.weigh_measured(t, &measured));
         }
         effects
     }
@@ -228,8 +228,8 @@ impl Filter {
     }
 
     /// All that was measured at place t.
-    fn weigh_measured(&mut self, t: Vertex, measured: Measured) -> Effects {
-        let mut effects = refusals(t, &measured);
+    fn weigh_measured(&mut self, t: Vertex, measured: &Measured) -> Effects {
+        let mut effects = refusals(t, measured);
         let (fits, mut known) = (measured.fits.len(), 0);
         for fit in &measured.fits {
             let testimony = self.revisits.see(&self.graph, fit, t, log_looks(fit, fits));

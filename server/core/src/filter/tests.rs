@@ -11,7 +11,7 @@ fn split() -> Filter {
         filter.extend(&chain());
     }
     let fits = vec![fit(0, 17.7, EdgeKind::Distance)];
-    filter.weigh_measured(20, Measured { fits, refused: vec![] });
+    filter.weigh_measured(20, &Measured { fits, refused: vec![] });
     filter
 }
 
@@ -33,7 +33,7 @@ fn of_what_all_know_two_edges_a_place_are_enough() {
     let mut fits: Vec<Fit> = (16..20).map(|i| fit(i, f64::from(20 - i), EdgeKind::Distance)).collect();
     fits.push(fit(15, 5.0, EdgeKind::Semantic));
     fits.push(fit(0, 20.0, EdgeKind::Distance));
-    let effects = filter.weigh_measured(20, Measured { fits, refused: vec![] });
+    let effects = filter.weigh_measured(20, &Measured { fits, refused: vec![] });
     let taken = |e: &&Effect| matches!(e, Effect::EdgeAccepted { .. });
     assert_eq!((effects.len(), effects.iter().filter(taken).count()), (6, 4));
     let older = |p: &Particle| -> Vec<Vertex> { p.edges.iter().map(|e| e.i).collect() };
@@ -105,7 +105,7 @@ fn what_was_seen_once_persuades_once() {
     let mut filter = straight();
     let see = |filter: &mut Filter| {
         let fits = vec![fit(0, 17.7, EdgeKind::Distance)];
-        filter.weigh_measured(20, Measured { fits, refused: vec![] });
+        filter.weigh_measured(20, &Measured { fits, refused: vec![] });
     };
     see(&mut filter);
     let once = log_odds(&filter);

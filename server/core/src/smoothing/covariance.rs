@@ -150,7 +150,8 @@ impl Belief {
     }
 
     /// Joint covariance of the newest pose with every pose, marginalised ones left out: from the
-    /// roots down, each clique's joint covariance from its parent's.
+    /// roots down, each clique's joint covariance from its parent's. The filter asks for few at a time
+    /// ([`Belief::relative`]); this is what the example `smooth` measures.
     pub fn joint_all<'a>(
         &self,
         structure: &Structure,

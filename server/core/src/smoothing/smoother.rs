@@ -1,4 +1,5 @@
-//! Smoothing of a single graph: a structure and the one belief about it.
+//! Smoothing of a single graph: a structure and the one belief about it. The filter has many beliefs and does
+//! without; benches, tests and the example `smooth` measure the smoother by this.
 
 use crate::geometry::Pose2;
 use crate::smoothing::{Belief, Factor, FactorId, Joint, JointRoom, Relative, SmoothError, Structure, Work};
@@ -6,8 +7,9 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
-/// The poses of one graph, with all its factors held. A clone shares all that neither changed. See [`Structure`] for what is added and taken
-/// out, and [`Belief`] for what is known then; both hold as of the last [`Smoother::update`].
+/// The poses of one graph, with all its factors held. A clone shares all that neither changed. See
+/// [`Structure`] for what is added and taken out, and [`Belief`] for what is known then; both hold as of the
+/// last [`Smoother::update`].
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Smoother {
     structure: Arc<Structure>,
