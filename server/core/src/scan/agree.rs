@@ -68,7 +68,7 @@ fn look_up(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::rooms::{ROOM, content};
+    use crate::scan::tests::{ROOM, content};
 
     /// How a wall that faces the origin at (x, 0) compares with what was seen of the room from its middle.
     fn wall_at(x: f32) -> Agreement {

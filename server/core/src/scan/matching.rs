@@ -145,7 +145,7 @@ fn same(a: &Pose2, b: &Pose2) -> bool {
 mod tests {
     use super::*;
     use crate::geometry::wrap;
-    use crate::scan::rooms::{HALL, ROOM, content};
+    use crate::scan::tests::{HALL, ROOM, content};
     use std::f64::consts::PI;
 
     fn found(i: &Content, j: &Content) -> Vec<Mode> {

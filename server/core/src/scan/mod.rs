@@ -18,8 +18,8 @@ pub mod cloud;
 pub mod correlate;
 pub mod matching;
 pub mod place;
-#[cfg(test)]
-pub mod rooms;
 pub mod sweep;
+#[cfg(test)]
+pub(crate) mod tests;
 pub mod view;
 mod weak;

@@ -60,7 +60,7 @@ pub fn spread(cloud: &[Point], n: usize) -> Vec<Point> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scan::rooms::{ROOM, seen};
+    use crate::scan::tests::{ROOM, seen};
 
     #[test]
     fn legs_that_walked_through_are_no_part_of_a_place() {

@@ -8,7 +8,7 @@ use crate::filter::decide::add_edge;
 use crate::filter::loops::Fit;
 use crate::scan::matching::Mode;
 use crate::scan::place::Content;
-use crate::scan::rooms::{HALL, ROOM, content};
+use crate::scan::tests::{HALL, ROOM, content};
 use crate::smoothing::{Factor, FactorId};
 use crate::track::front::{Chain, FrozenPlace, OpenPlace};
 use nalgebra::Matrix3;
