@@ -218,7 +218,7 @@ pub fn tour(name: &str, seed: u64) -> Result<Tour, SimError> {
         "slip" | "unsigned" | "break" | "clean" => plain::office(name, seed),
         _ => court::row(name, seed),
     }?;
-    if name.ends_with("-decided") {
+    if name.ends_with("-decided") || name == "start" {
         tour.decisive_s = design::decisive(&tour);
     }
     Ok(tour)
