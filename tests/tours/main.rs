@@ -18,7 +18,7 @@ mod table;
 mod tour;
 mod truth;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use args::Args;
 use clap::Parser;
 use score::Summary;
@@ -35,13 +35,17 @@ fn main() -> Result<()> {
     if let Some(folder) = &args.write {
         write(folder, &suite)?;
     }
-    let rows = suite.run()?;
+    let (rows, failed) = suite.run();
     if let Some(file) = &args.results {
         let text = results::text(&rows, suite.seeds.clone().count(), args.preset);
-        return std::fs::write(file, text).with_context(|| format!("--results {}", file.display()));
+        std::fs::write(file, text).with_context(|| format!("--results {}", file.display()))?;
+    } else {
+        for row in rows {
+            print(&Summary::new(row.setting, &row.outcomes), args.json)?;
+        }
     }
-    for row in rows {
-        print(&Summary::new(row.setting, &row.outcomes), args.json)?;
+    if !failed.is_empty() {
+        bail!("left out, since they could not be taken: {}", failed.join("; "));
     }
     Ok(())
 }

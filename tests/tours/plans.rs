@@ -27,7 +27,7 @@ pub fn missing(shared: Option<&File>) -> Option<String> {
     (!tar.is_ok_and(|o| o.status.success())).then(|| "it needs tar".into())
 }
 
-/// Plays a tour of the plan that is the seed's; where that has no two rooms in reach, of the next one.
+/// Plays a tour of the plan that is the seed's; where that has no scale or no two rooms in reach, of the next one.
 pub fn tour(shared: &File, seed: u64, languages: &[Language]) -> Result<Tour> {
     let archive = archive(shared);
     let listed = tar(&["-tzf"], &archive, None)?;
@@ -36,8 +36,9 @@ pub fn tour(shared: &File, seed: u64, languages: &[Language]) -> Result<Tour> {
     plans.sort_unstable();
     for k in 0..plans.len() {
         let name = plans[(seed as usize + k) % plans.len()];
-        let plan = FloorPlan::parse(&tar(&["-xOzf"], &archive, Some(name))?, File::new(name))
-            .with_context(|| format!("{}: {name}", archive.display()))?;
+        let Ok(plan) = FloorPlan::parse(&tar(&["-xOzf"], &archive, Some(name))?, File::new(name)) else {
+            continue;
+        };
         match planned(&plan, seed) {
             Ok(tour) => return simulated::played(&tour, languages),
             Err(SimError::TooSmall(_)) => {}

@@ -46,8 +46,9 @@ pub struct Row {
 type Mapped = Vec<((Language, u32), Outcome)>;
 
 impl Suite {
-    /// Runs all of it. Progress goes to stderr.
-    pub fn run(&self) -> Result<Vec<Row>> {
+    /// Runs all of it. Progress goes to stderr. Seeds of tours that could not be taken are left out, and told
+    /// beside the rows: one of them must not cost the others.
+    pub fn run(&self) -> (Vec<Row>, Vec<String>) {
         let tours: Vec<&String> = self.tours.iter().filter(|t| self.is_there(t)).collect();
         let jobs: Vec<(&String, u64)> =
             tours.iter().flat_map(|&tour| self.seeds.clone().map(move |seed| (tour, seed))).collect();
@@ -58,9 +59,18 @@ impl Suite {
             eprintln!("{:6.0} s  {count}/{}  {tour}, seed {seed}", began.elapsed().as_secs_f64(), jobs.len());
             mapped
         });
-        let mapped = mapped.into_iter().collect::<Result<Vec<Mapped>>>()?;
+        let mut failed = Vec::new();
+        let mapped: Vec<Mapped> = mapped
+            .into_iter()
+            .map(|m| {
+                m.unwrap_or_else(|why| {
+                    failed.push(format!("{why:#}"));
+                    Mapped::new()
+                })
+            })
+            .collect();
         let of_tour = mapped.chunks(self.seeds.clone().count().max(1));
-        Ok(tours.iter().zip(of_tour).flat_map(|(tour, seeds)| self.rows(tour, seeds)).collect())
+        (tours.iter().zip(of_tour).flat_map(|(tour, seeds)| self.rows(tour, seeds)).collect(), failed)
     }
 
     /// The one tour and language to write.
@@ -182,7 +192,7 @@ mod tests {
             shared: None,
         };
         let run = |threads| {
-            let mut row = suite(threads).run().unwrap().remove(0);
+            let mut row = suite(threads).run().0.remove(0);
             row.outcomes.iter_mut().for_each(|o| assert!(o.cpu_ms_per_s.take() > Some(0.0)));
             row.outcomes
         };
