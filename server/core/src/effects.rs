@@ -44,7 +44,7 @@ pub struct Heard {
     pub text: String,
     /// What became of it.
     pub status: HeardStatus,
-    /// The analysis, in the notation of `language/parse.rs`; empty if there is none.
+    /// The analysis, in the notation of `language/notation.rs`; empty if there is none.
     pub parse: String,
     /// Where it was put in the best particle: place and probability, best first.
     pub grounded: Vec<(PlaceId, f64)>,

@@ -161,8 +161,8 @@ impl Mapper {
 
     /// Algorithm 1 for each place just left, and what was described is looked for in the map as it is now.
     fn grow(&mut self, frozen: Vec<FrozenPlace>, effects: &mut Effects) {
-        let trial = self.trial.clone();
         for place in frozen {
+            let trial = self.trial.clone();
             self.change(effects, |filter, talk| {
                 let effects = filter.step(place, &|t, measured| trial.spoil(t, &mut measured.fits));
                 trial.force(filter);

@@ -67,10 +67,9 @@ pub struct Fit {
 }
 
 impl Fit {
-    /// A fit that `support` places agree with, a metre apart.
+    /// A fit that `support` places agree with, a metre apart, and that no names led to.
     pub fn supported_by(i: Vertex, mode: Mode, kind: EdgeKind, support: u32) -> Self {
-        let named = (kind == EdgeKind::Semantic).then_some((i, i + 20));
-        Self { i, mode, kind, named, support, support_path_m: f64::from(support), age: 0 }
+        Self { i, mode, kind, named: None, support, support_path_m: f64::from(support), age: 0 }
     }
 
     /// Whether enough places agree for it to count.

@@ -179,7 +179,8 @@ mod tests {
         p.update(&structure).unwrap();
         let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
         let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score: 0.9, overlap: 0.6 };
-        let fit = Fit::supported_by(0, mode, EdgeKind::Semantic, 3);
+        let mut fit = Fit::supported_by(0, mode, EdgeKind::Semantic, 3);
+        fit.named = Some((0, 20));
         p.take(add_edge(&mut structure, &fit, 0, 20).unwrap());
         p.update(&structure).unwrap();
         (structure, p, fit)

@@ -33,7 +33,11 @@ fn a_place_is_matched_with_few_others_and_with_those_that_words_name_first() {
 fn the_first_edge_that_counts_of_a_revisit_by_words_is_theirs() {
     let covariance = Matrix3::identity();
     let mode = Mode { i_from_j: Pose2::default(), covariance, score: 0.9, overlap: 0.6 };
-    let next = |kind, support| Fit::supported_by(0, mode, kind, support).kind_of_next();
+    let next = |kind, support| {
+        let mut fit = Fit::supported_by(0, mode, kind, support);
+        fit.named = (kind == EdgeKind::Semantic).then_some((0, 20));
+        fit.kind_of_next()
+    };
     assert_eq!(next(EdgeKind::Semantic, 1), EdgeKind::Semantic);
     assert_eq!(next(EdgeKind::Semantic, 6), EdgeKind::Distance);
     assert_eq!(next(EdgeKind::Relocalisation, 6), EdgeKind::Relocalisation);
