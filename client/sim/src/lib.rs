@@ -10,6 +10,7 @@
 pub mod args;
 mod body;
 mod building;
+mod calibration;
 mod cast;
 mod doors;
 mod fault;

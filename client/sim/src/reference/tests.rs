@@ -1,7 +1,9 @@
+use super::super::calibration::Systematic;
 use super::super::geom::{Rect, between, compose};
 use super::super::{Draw, People, Plan, Scene, Sentence, Wheels};
-use super::wheels::{Link, Systematic};
+use super::wheels::Link;
 use super::*;
+use nalgebra::Matrix3;
 use std::f64::consts::FRAC_PI_2;
 use toponym_proto::{Clock, Header, Scan, Stamp};
 
@@ -102,26 +104,21 @@ fn errors_in_the_dark_spread_as_predicted() {
     let stretch = Stretch::dark((lit.duration_s(), drive.duration_s()));
     let rel = between(&drive.at(stretch.from_s), &drive.at(stretch.to_s));
     let (prior, n) = (prior(0.05), 2000);
-    let (mut sample, mut predicted) = (plane::ZERO, plane::ZERO);
+    let (mut sample, mut predicted) = (Matrix3::zeros(), Matrix3::zeros());
     for seed in 0..n {
         let mut draw = Draw::new(seed, 0);
         let wheels = prior.draw(&mut draw);
         let odometry = drive.measured(&wheels, &mut draw);
         let learned = Systematic::learn(&drive, &odometry, &prior, 0..lit.poses.len() - 1);
-        let link = Link::new(&drive, &odometry, &prior, learned.mean, &stretch);
+        let link = Link::new(&drive, &odometry, &prior, &learned.mean, &stretch);
         let e = link.residual(&rel);
-        let spread = plane::add(&link.noise, &plane::through(&link.by_systematic, &learned.covariance));
-        for i in 0..3 {
-            for j in 0..3 {
-                sample[i][j] += e[i] * e[j] / n as f64;
-                predicted[i][j] += spread[i][j] / n as f64;
-            }
-        }
+        sample += e * e.transpose() / n as f64;
+        predicted += (link.noise + plane::through(&link.by_systematic, &learned.covariance)) / n as f64;
     }
     for i in 0..3 {
         for j in 0..3 {
-            let scale = (predicted[i][i] * predicted[j][j]).sqrt();
-            let off = (sample[i][j] - predicted[i][j]) / scale;
+            let scale = (predicted[(i, i)] * predicted[(j, j)]).sqrt();
+            let off = (sample[(i, j)] - predicted[(i, j)]) / scale;
             assert!(off.abs() < 0.1, "[{i}][{j}] off by {off}: {sample:?}, not {predicted:?}");
         }
     }
@@ -168,7 +165,7 @@ fn the_light_teaches_systematic_errors_and_sharpens_the_dark() {
     assert!(dark_from(0.0) < 0.6, "6 % of 24 m look like {PITCH_M} m more: {}", dark_from(0.0));
     let learned = Systematic::learn(&drive, &odometry, &known, 0..400);
     assert!((learned.mean[0] - 0.06).abs() < 0.015, "{learned:?}");
-    assert!(learned.covariance[0][0].sqrt() < 0.01, "{learned:?}");
+    assert!(learned.covariance[(0, 0)].sqrt() < 0.01, "{learned:?}");
 }
 
 #[test]

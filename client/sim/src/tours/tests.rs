@@ -1,9 +1,10 @@
 //! Tours as a whole: what all of them promise.
 
-use super::strain::{calibrated, strain};
+use super::strain::{strain, unknown};
 use super::*;
 use crate::geom::between;
 use crate::{Draw, Wheels};
+use nalgebra::Vector3;
 use toponym_proto::Limits;
 
 /// Tours on which more than one hypothesis stands.
@@ -108,13 +109,12 @@ fn alike(tour: &Tour, hypothesis: &Hypothesis, from_s: f64, until_s: f64) {
 fn observed(tour: &Tour) -> (f64, f64) {
     let mut draw = Draw::new(tour.seed, 77);
     let prior = &tour.wheels_prior;
-    let known = calibrated(&tour.drive, &tour.blind_s, prior);
-    let [a, b, c] = known.turn_bias;
-    let (u, v) = (draw.normal(), draw.normal());
+    let drawn = Vector3::from_fn(|_, _| draw.normal());
+    let errors = unknown(&tour.drive, &tour.blind_s, prior) * drawn;
     let errors = Wheels {
-        scale_error: known.scale * draw.normal(),
-        turn_error: a * u,
-        yaw_bias_rad_per_m: b * u + c * v,
+        scale_error: errors.x,
+        turn_error: errors.y,
+        yaw_bias_rad_per_m: errors.z,
         ..tour.scenario.wheels
     };
     let measured = tour.drive.measured(&errors, &mut draw);
