@@ -8,13 +8,10 @@ use anyhow::{Context, Result, bail};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 use std::fs::File;
-use std::io::BufWriter;
 use std::path::Path as FilePath;
 use toponym_core::Pose2;
-use toponym_proto::record::RecordWriter;
-use toponym_proto::{Message, Stamp};
+use toponym_sim::write;
 
 /// Reports at the checkpoints; only the last must be there.
 const REPORTS: [&str; 4] = ["report_25.json", "report_50.json", "report_75.json", "report.json"];
@@ -55,36 +52,15 @@ struct NameFile {
 }
 
 /// Writes a tour in a language: `sim.rec`, `narration.jsonl`, `truth.json`, `questions.json`.
-pub fn write(folder: &FilePath, tour: &str, language: &str, case: &Case) -> Result<()> {
+pub fn write_case(folder: &FilePath, tour: &str, language: &str, case: &Case) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let file = |name: &str| folder.join(name);
-    record(&case.messages, &file("sim.rec"))?;
-    std::fs::write(file("narration.jsonl"), narration(&case.messages))?;
+    write::record(&case.messages, File::create(file(write::RECORD))?)?;
+    std::fs::write(file("narration.jsonl"), write::narration(&case.messages))?;
     let (truth, questions) = truth_files(tour, language, case);
     std::fs::write(file("truth.json"), serde_json::to_string(&truth)? + "\n")?;
     std::fs::write(file("questions.json"), serde_json::to_string_pretty(&questions)? + "\n")?;
     Ok(())
-}
-
-fn record(messages: &[Message], file: &FilePath) -> Result<()> {
-    let out = BufWriter::new(File::create(file).with_context(|| file.display().to_string())?);
-    let mut writer = RecordWriter::new(out)?;
-    for message in messages.iter().filter(|m| !matches!(m, Message::Say(_))) {
-        writer.write(message)?;
-    }
-    Ok(writer.flush()?)
-}
-
-fn narration(messages: &[Message]) -> String {
-    let mut text = String::new();
-    for message in messages {
-        if let Message::Say(say) = message {
-            let t = say.began.map(Stamp::seconds);
-            // Writing to a string cannot fail.
-            let _ = writeln!(text, "{}", serde_json::json!({"t": t, "id": say.id, "text": say.text}));
-        }
-    }
-    text
 }
 
 /// Outlines get ids, one each.

@@ -68,7 +68,7 @@ fn write(folder: &Path, suite: &Suite) -> Result<()> {
         let tour = suite.tour(name, seed)?;
         let case = tour.case(language).with_context(|| format!("{name} is not told in {language}"))?;
         let folder = folder.join(seed.to_string());
-        folder::write(&folder, name, &language.to_string(), &case)
+        folder::write_case(&folder, name, &language.to_string(), &case)
             .with_context(|| format!("--write {}", folder.display()))?;
         eprintln!("wrote {}", folder.display());
     }

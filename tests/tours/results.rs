@@ -4,7 +4,7 @@ use crate::score::{Calibration, Summary};
 use crate::suite::Row;
 use crate::table::{number, rate, spread};
 use std::fmt::Write as _;
-use std::time::{SystemTime, UNIX_EPOCH};
+use std::time::SystemTime;
 use toponym_server::map::Preset;
 
 /// What stands above the tables.
@@ -22,7 +22,7 @@ pub fn text(rows: &[Row], seeds: usize, preset: Preset) -> String {
     let _ = writeln!(
         out,
         "Written by `tours --results` on {}: build {}{commit}, {seeds} seeds, preset {}. {HEAD}",
-        date(days_since_1970()),
+        date(SystemTime::now()),
         toponym_server::map::build(),
         preset,
     );
@@ -37,12 +37,13 @@ pub fn text(rows: &[Row], seeds: usize, preset: Preset) -> String {
 /// A column's head and what stands in it.
 type Column = (&'static str, fn(&Summary) -> String);
 
-const GRAPHS: [Column; 8] = [
+const GRAPHS: [Column; 9] = [
     ("true mass at the end", |s| spread(s.masses.mass_true_topology)),
     ("at 25 %", |s| spread(s.masses.mass_at_25)),
     ("at 50 %", |s| spread(s.masses.mass_at_50)),
     ("at 75 %", |s| spread(s.masses.mass_at_75)),
     ("reference at the end", |s| spread(s.reference.and_then(|r| r.mass_true_topology))),
+    ("open by it at 75 %", |s| number(s.reference_open.get("at_75").copied().flatten())),
     ("−ln mass, mean", |s| number(s.masses.neg_log_mass.map(|n| n.mean))),
     ("of none", |s| spread(s.mass_of_none)),
     ("undecidable", |s| s.undecidable.as_ref().map_or("-".into(), |u| u.count.to_string())),
@@ -142,20 +143,9 @@ fn together(rows: &[Row]) -> String {
     table("All tours together", &heads, kinds.into_iter().map(line))
 }
 
-fn days_since_1970() -> u64 {
-    SystemTime::now().duration_since(UNIX_EPOCH).map_or(0, |d| d.as_secs() / 86_400)
-}
-
-/// A day as year-month-day: eras of 400 years that begin in March, so that leap days come last.
-fn date(days_since_1970: u64) -> String {
-    let days = days_since_1970 + 719_468;
-    let (era, day) = (days / 146_097, days % 146_097);
-    let year = (day - day / 1_460 + day / 36_524 - day / 146_096) / 365;
-    let of_year = day - (365 * year + year / 4 - year / 100);
-    let month = (5 * of_year + 2) / 153;
-    let of_month = of_year - (153 * month + 2) / 5 + 1;
-    let (month, year) = if month < 10 { (month + 3, year) } else { (month - 9, year + 1) };
-    format!("{:04}-{month:02}-{of_month:02}", era * 400 + year)
+/// Year-month-day.
+fn date(now: SystemTime) -> String {
+    humantime::format_rfc3339_seconds(now).to_string().chars().take_while(|c| *c != 'T').collect()
 }
 
 #[cfg(test)]
@@ -165,16 +155,9 @@ mod tests {
     use crate::truth::{Hypothesis, Truth};
 
     #[test]
-    fn days_are_told_as_dates() {
-        for (days, text) in [
-            (0, "1970-01-01"),
-            (59, "1970-03-01"),
-            (11_016, "2000-02-29"),
-            (11_017, "2000-03-01"),
-            (20_453, "2025-12-31"),
-        ] {
-            assert_eq!(date(days), text);
-        }
+    fn the_day_is_told_without_the_hour() {
+        let leap_day = SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(11_016 * 86_400 + 3_600);
+        assert_eq!(date(leap_day), "2000-02-29");
     }
 
     #[test]

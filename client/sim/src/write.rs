@@ -35,7 +35,7 @@ pub fn write_hypotheses(
     folder: &Path,
 ) -> io::Result<&'static str> {
     std::fs::create_dir_all(folder)?;
-    record(recording, std::fs::File::create(folder.join(RECORD))?)?;
+    record(&recording.messages, std::fs::File::create(folder.join(RECORD))?)?;
     let log = if fits_carmen(recording) { CARMEN } else { RECORD };
     if log == CARMEN {
         std::fs::write(folder.join(CARMEN), carmen(recording))?;
@@ -43,7 +43,7 @@ pub fn write_hypotheses(
         // A run before this one left it: it would pass for this one's.
         std::fs::remove_file(folder.join(CARMEN))?;
     }
-    std::fs::write(folder.join("narration.jsonl"), narration(recording))?;
+    std::fs::write(folder.join("narration.jsonl"), narration(&recording.messages))?;
     let (mut truth, questions) = truth(recording);
     if !hypotheses.is_empty() {
         truth["hypotheses"] = hypotheses.iter().map(told).collect();
@@ -56,16 +56,16 @@ pub fn write_hypotheses(
 fn told(hypothesis: &Hypothesis) -> Value {
     let piece = |p: &Piece| {
         let Pose { x_m, y_m, yaw_rad } = p.world_from_true;
-        json!({"from_s": p.from_s, "x_m": x_m, "y_m": y_m, "yaw_rad": yaw_rad})
+        json!({"from_s": p.from_s, "world_from_true": [x_m, y_m, yaw_rad]})
     };
     json!({"name": hypothesis.name, "pieces": hypothesis.pieces.iter().map(piece).collect::<Vec<_>>()})
 }
 
 /// Writes the robot's streams as a record file, as `serve --record` does, but without sentences:
 /// these are in the narration, as for any other log.
-pub fn record(recording: &Recording, out: impl io::Write) -> io::Result<()> {
-    let mut writer = RecordWriter::new(out).map_err(io::Error::other)?;
-    for message in recording.messages.iter().filter(|m| !matches!(m, Message::Say(_))) {
+pub fn record(messages: &[Message], out: impl io::Write) -> io::Result<()> {
+    let mut writer = RecordWriter::new(io::BufWriter::new(out)).map_err(io::Error::other)?;
+    for message in messages.iter().filter(|m| !matches!(m, Message::Say(_))) {
         writer.write(message).map_err(io::Error::other)?;
     }
     writer.flush().map_err(io::Error::other)
@@ -139,9 +139,9 @@ fn flaser(text: &mut String, scan: &Scan, odom: &Pose, offset_m: f64) {
 }
 
 /// The sentences, one JSON object a line; `t` is the log's own stamp.
-pub fn narration(recording: &Recording) -> String {
+pub fn narration(messages: &[Message]) -> String {
     let mut text = String::new();
-    for message in &recording.messages {
+    for message in messages {
         if let Message::Say(say) = message {
             let t = say.began.map(toponym_proto::Stamp::seconds);
             let _ = writeln!(text, "{}", json!({"t": t, "id": say.id, "text": say.text}));
@@ -219,7 +219,7 @@ mod tests {
     fn each_sentence_is_a_line() {
         let recording = recording();
         let lines: Vec<Value> =
-            narration(&recording).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
+            narration(&recording.messages).lines().map(|l| serde_json::from_str(l).unwrap()).collect();
         assert!(!lines.is_empty());
         assert!(lines.iter().all(|l| l["t"].is_f64() && l["text"].is_string()));
     }
@@ -241,7 +241,7 @@ mod tests {
     fn the_record_has_all_messages_but_the_sentences() {
         let recording = recording();
         let mut bytes = Vec::new();
-        record(&recording, &mut bytes).unwrap();
+        record(&recording.messages, &mut bytes).unwrap();
         let read = RecordReader::new(bytes.as_slice()).unwrap().map(|m| m.unwrap().1);
         let want = recording.messages.into_iter().filter(|m| !matches!(m, Message::Say(_)));
         // NaN is no information, and no number equals it.

@@ -58,7 +58,7 @@ fn the_truth_comes_back_as_it_was_written() {
 fn what_the_servers_map_makes_of_a_folder_scores_as_the_run_itself() {
     let (folder, case) = (Temporary::new("written"), case());
     let seed = folder.0.join("3");
-    write(&seed, "walk", "simple", &case).unwrap();
+    write_case(&seed, "walk", "simple", &case).unwrap();
     let file = |name: &str| seed.join(name).display().to_string();
     let asks = case.truth.questions.iter().flat_map(|q| ["--ask".to_owned(), q.text.clone()]);
     let options = ["map", &file("sim.rec"), "--narration", &file("narration.jsonl"), "--seed", "3"];
@@ -84,7 +84,7 @@ fn a_folder_that_cannot_be_scored_says_what_is_missing() {
     let (folder, case) = (Temporary::new("missing"), case());
     std::fs::create_dir_all(&folder.0).unwrap();
     assert!(format!("{:#}", score(&folder.0).unwrap_err()).contains("no folder of a seed"));
-    write(&folder.0.join("3"), "walk", "simple", &case).unwrap();
+    write_case(&folder.0.join("3"), "walk", "simple", &case).unwrap();
     assert!(format!("{:#}", score(&folder.0).unwrap_err()).contains("report.json"));
     std::fs::write(folder.0.join("3/report.json"), r#"{"places": [], "particles": []}"#).unwrap();
     std::fs::write(folder.0.join("3/trajectory.txt"), "# t x y yaw\n0 0 0\n").unwrap();

@@ -10,6 +10,9 @@ const MASS_MIN: f64 = 1e-3;
 /// Where a reference gives the truth less in the end, nobody could know.
 const DECIDABLE: f64 = 0.9;
 
+/// Between these a reference's best hypothesis leaves the question open.
+const OPEN: std::ops::RangeInclusive<f64> = 0.3..=0.8;
+
 /// Which runs were scored.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
 pub struct Setting {
@@ -50,6 +53,7 @@ pub struct Summary {
     pub by_truth: BTreeMap<String, Group>,
     pub undecidable: Option<Undecidable>,
     pub reference: Option<Masses>,
+    pub reference_open: BTreeMap<&'static str, Option<f64>>,
     pub runs: Vec<Run>,
 }
 
@@ -152,6 +156,7 @@ impl Summary {
                 .iter()
                 .any(|o| o.reference.is_some())
                 .then(|| Masses::of(outcomes, |o, k| o.reference.as_ref()?.mass_true.get(k).copied())),
+            reference_open: reference_open(outcomes),
             runs: outcomes.iter().map(Run::of).collect(),
         }
     }
@@ -233,14 +238,25 @@ fn claims(outcomes: &[Outcome]) -> Vec<Vec<Claim>> {
 }
 
 fn total_variation(outcomes: &[Outcome]) -> BTreeMap<&'static str, Option<f64>> {
-    let at = |k: usize| {
+    at_checkpoints(|k| {
         let apart = |o: &Outcome| {
             let reference = o.reference.as_ref()?.mass.get(k)?;
             Some(o.checkpoints.get(k)?.as_ref()?.total_variation(reference))
         };
         median(&outcomes.iter().filter_map(apart).collect::<Vec<f64>>())
-    };
-    ["at_25", "at_50", "at_75", "at_end"].into_iter().enumerate().map(|(k, key)| (key, at(k))).collect()
+    })
+}
+
+/// Share of the seeds in which the reference leaves open which hypothesis it is.
+fn reference_open(outcomes: &[Outcome]) -> BTreeMap<&'static str, Option<f64>> {
+    at_checkpoints(|k| {
+        let best = |o: &Outcome| o.reference.as_ref()?.mass.get(k)?.iter().copied().reduce(f64::max);
+        Share::count(outcomes.iter().filter_map(best).map(|best| OPEN.contains(&best))).value()
+    })
+}
+
+fn at_checkpoints(value: impl Fn(usize) -> Option<f64>) -> BTreeMap<&'static str, Option<f64>> {
+    ["at_25", "at_50", "at_75", "at_end"].into_iter().enumerate().map(|(k, key)| (key, value(k))).collect()
 }
 
 /// Mass at the end of each hypothesis, by its name.
@@ -323,12 +339,18 @@ mod tests {
     }
 
     #[test]
+    fn a_reference_that_gives_its_best_little_leaves_it_open() {
+        let open = summary().reference_open;
+        assert_eq!((open["at_75"], open["at_end"]), (Some(0.0), Some(1.0 / 3.0)));
+    }
+
+    #[test]
     fn seeds_that_nobody_could_know_are_listed() {
         assert_eq!(summary().undecidable, Some(Undecidable { count: 1, seeds: vec![2] }));
         let bare = Outcome { reference: None, ..outcome(1, 1.0, 1.0) };
         let summary = Summary::new(Setting::default(), &[bare]);
         assert_eq!((summary.undecidable, summary.reference), (None, None));
-        assert_eq!(summary.total_variation["at_end"], None);
+        assert_eq!((summary.total_variation["at_end"], summary.reference_open["at_end"]), (None, None));
     }
 
     #[test]

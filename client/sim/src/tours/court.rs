@@ -1,7 +1,7 @@
 //! Suites side by side on a dark court: which of the equal doors did the robot come back to?
 
 use super::Tour;
-use super::design::{Design, Return, Walk};
+use super::design::{Design, Return, Walk, first_that_fits};
 use super::stamp::Quarter;
 use super::unit::{Style, Unit, WALL_M};
 use super::words::Names;
@@ -9,11 +9,12 @@ use crate::SimError;
 use crate::geom::{Point, Rect};
 use crate::random::Draw;
 use crate::world::Plan;
+use std::cmp::Ordering;
 
 /// The court reaches so far beyond what is in use, metres.
 const MARGIN_M: f64 = 8.0;
 /// Times that a court is drawn again, larger, for wheels to lose their way on.
-const TRIES: usize = 5;
+const TRIES: i32 = 5;
 /// But never so large that the robot is in the dark for more than 100 m.
 const OUT_MAX_M: f64 = 46.0;
 /// By so much each.
@@ -48,7 +49,7 @@ fn kind(name: &str) -> Kind {
     let court =
         Kind { style: suite(annex), units: 2, out_m: (38.0, 44.0), late_m: 0.0, people: 0, aim: (0.4, 0.95) };
     match name {
-        "autonomous" => Kind { people: 1, aim: (0.3, 0.75), ..court },
+        "autonomous" => Kind { people: 1, ..court },
         "twins" | "twins-decided" => {
             let style = Style { front_m: (4.0, 5.5), hall_m: Some((8.0, 10.0)), sides: 2, ..suite(annex) };
             Kind { style, late_m: 14.0, aim: (0.6, 1.0), ..court }
@@ -95,25 +96,11 @@ fn named(name: &str, unit: &Unit, units: usize, draw: &mut Draw) -> Vec<Vec<Stri
 
 /// A court with a row of suites: `small`, `autonomous`, `twins`, `rows`.
 pub(super) fn row(name: &'static str, seed: u64) -> Result<Tour, SimError> {
-    let mut larger = 1.0;
-    let mut best: Option<(Tour, f64)> = None;
-    for _ in 0..TRIES {
-        let kind = kind(name);
-        let (aim, design) = row_design(name, &kind, larger, seed)?;
-        let (tour, strain) = design.tour(name, seed);
-        let fits = strain <= aim * 1.1;
-        if best.as_ref().is_none_or(|(_, least)| strain < *least) {
-            best = Some((tour, strain));
-        }
-        if fits {
-            break;
-        }
-        larger *= LARGER;
-    }
-    best.map(|(tour, _)| tour).ok_or(SimError::NoTour)
+    let sizes = (0..TRIES).map(|k| LARGER.powi(k));
+    first_that_fits(name, seed, sizes.map(|larger| row_design(name, &kind(name), larger, seed)))
 }
 
-fn row_design(name: &'static str, kind: &Kind, larger: f64, seed: u64) -> Result<(f64, Design), SimError> {
+fn row_design(name: &'static str, kind: &Kind, larger: f64, seed: u64) -> Result<Design, SimError> {
     let mut draw = Draw::new(seed, 4);
     let unit = Unit::draw(&kind.style, &mut draw);
     let each_m = unit.width_m + WALL_M;
@@ -151,19 +138,24 @@ fn row_design(name: &'static str, kind: &Kind, larger: f64, seed: u64) -> Result
         walk.to(firsts[led] + stop)?;
     }
     let (start, legs) = (walk.start, walk.legs);
-    let moved = |k: &usize| (label(&names[*k]), at(*k).after(&at(led).inverse()).pose());
+    let door = |k: usize| match k.cmp(&home) {
+        Ordering::Equal => "the door it left by",
+        _ if kind.units == 2 => "its look-alike",
+        Ordering::Less => "the door before it",
+        Ordering::Greater => "the door after it",
+    };
+    let moved = |k: &usize| (door(*k).to_owned(), at(*k).after(&at(led).inverse()).pose());
     let mut returns: Return = vec![moved(&led)];
     returns.extend(alike.iter().filter(|k| **k != led).map(moved));
     returns[0].1 = toponym_proto::Pose::default();
     let aim = draw.within(kind.aim);
-    let design = Design {
+    Ok(Design {
         returns: vec![returns],
         late_m: kind.late_m,
         aim,
         people: kind.people,
         ..Design::plain(world, start, legs)
-    };
-    Ok((aim, design))
+    })
 }
 
 /// A court in the open, dark all over and half into the doorways to it: not all through, or rays
@@ -177,10 +169,6 @@ fn ground(plan: &mut Plan, court: &Rect, turned: &Quarter) {
         [court.x1_m + half_m, court.y1_m + half_m],
     ));
     plan.stamp(&ground, turned, |_| "courtyard".into());
-}
-
-fn label(names: &[String]) -> String {
-    format!("by the {}", names[0])
 }
 
 /// Rooms visited before going out, the last one at the door; the first is the start.
@@ -234,19 +222,7 @@ const LARGE_TURNS: usize = 3;
 
 /// Three buildings at one court, two of them with a look-alike beside them: `large`.
 pub(super) fn large(name: &'static str, seed: u64) -> Result<Tour, SimError> {
-    let mut best: Option<(Tour, f64)> = None;
-    for turns in 1..=LARGE_TURNS {
-        let (aim, design) = large_design(turns, seed)?;
-        let (tour, strain) = design.tour(name, seed);
-        let fits = strain <= aim * 1.1;
-        if best.as_ref().is_none_or(|(_, least)| strain < *least) {
-            best = Some((tour, strain));
-        }
-        if fits {
-            break;
-        }
-    }
-    best.map(|(tour, _)| tour).ok_or(SimError::NoTour)
+    first_that_fits(name, seed, (1..=LARGE_TURNS).map(|turns| large_design(turns, seed)))
 }
 
 /// A suite put somewhere.
@@ -255,7 +231,6 @@ struct Put {
     door: Point,
     first: usize,
     back: usize,
-    name: String,
 }
 
 const SOUTH: [[&str; 4]; 2] =
@@ -264,7 +239,7 @@ const EAST: [[&str; 4]; 2] =
     [["cafeteria", "hallway", "workshop", "lobby"], ["lecture hall", "hallway", "office", "lobby"]];
 const NORTH: [&str; 4] = ["lobby", "hallway", "cafeteria", "gym"];
 
-fn large_design(turns: usize, seed: u64) -> Result<(f64, Design), SimError> {
+fn large_design(turns: usize, seed: u64) -> Result<Design, SimError> {
     let mut draw = Draw::new(seed, 4);
     let units: Vec<Unit> = (0..3).map(|_| Unit::draw(&suite(false), &mut draw)).collect();
     let size = [draw.within((32.0, 38.0)), draw.within((32.0, 38.0))];
@@ -276,7 +251,7 @@ fn large_design(turns: usize, seed: u64) -> Result<(f64, Design), SimError> {
         let at = turned.after(&at);
         let first = units[unit].put(plan, &at, &names, &mut draw);
         let door = at.point([units[unit].door[0], units[unit].door[1] + 0.8]);
-        Put { at, door, first, back: units[unit].back(), name: names[if unit == 1 { 0 } else { 3 }].clone() }
+        Put { at, door, first, back: units[unit].back() }
     };
     let south: Vec<Put> = (0..2)
         .map(|k| put(&mut plan, 0, Quarter::shift([3.0 + each(0) * k as f64, 0.0]), &SOUTH[k]))
@@ -313,16 +288,18 @@ fn large_design(turns: usize, seed: u64) -> Result<(f64, Design), SimError> {
         walk.to(east[last].first + room)?;
     }
     let (start, legs) = (walk.start, walk.legs);
-    let alike = |all: &[Put], truth: usize| -> Return {
+    let alike = |side: &str, all: &[Put], before: usize, truth: usize| -> Return {
         let moved = all[1 - truth].at.after(&all[truth].at.inverse()).pose();
-        let name = |k: usize| format!("by {}", all[k].name);
+        let which = |k| if k == before { "as before" } else { "its look-alike" };
+        let name = |k: usize| format!("{side}, {}", which(k));
         vec![(name(truth), toponym_proto::Pose::default()), (name(1 - truth), moved)]
     };
     let sure = || vec![(String::new(), toponym_proto::Pose::default())];
     let aim = draw.within((0.35, 0.9));
     // To the north; back south; to the east; north again; back east.
-    let returns = vec![sure(), alike(&south, led), sure(), sure(), alike(&east, last)];
-    Ok((aim, Design { returns, aim, ..Design::plain(world, start, legs) }))
+    let returns =
+        vec![sure(), alike("south", &south, from, led), sure(), sure(), alike("east", &east, other, last)];
+    Ok(Design { returns, aim, ..Design::plain(world, start, legs) })
 }
 
 /// Across a court and back along an axis, from the far side to the near one (`y`), or from there

@@ -1,7 +1,7 @@
 //! A square ring whose four sides are alike, left for its dark middle and entered again: `ring`.
 
 use super::Tour;
-use super::design::{Design, Return, Walk};
+use super::design::{Design, Return, Walk, first_that_fits};
 use super::stamp::Quarter;
 use super::unit::WALL_M;
 use super::words::Names;
@@ -23,6 +23,8 @@ const ROUNDS: (usize, usize) = (7, 16);
 const AIM: (f64, f64) = (1.0, 1.6);
 /// σ of the turn error of wheels on such a tour.
 const TURN: f64 = 0.05;
+/// What a return may have led to, seen from where it left.
+const DOORS: [&str; 4] = ["the door it left by", "a quarter on", "half round", "a quarter back"];
 /// The guide says nothing for so long after the return.
 const LATE_M: f64 = 14.0;
 
@@ -88,19 +90,8 @@ impl Side {
 
 /// The tour.
 pub(super) fn ring(name: &'static str, seed: u64) -> Result<Tour, SimError> {
-    let mut best: Option<(Tour, f64)> = None;
-    for rounds in (ROUNDS.0..=ROUNDS.1).step_by(3) {
-        let design = design(name, seed, rounds)?;
-        let aim = design.aim;
-        let (tour, strain) = design.tour(name, seed);
-        if best.as_ref().is_none_or(|(_, least)| strain < *least) {
-            best = Some((tour, strain));
-        }
-        if strain <= aim * 1.1 {
-            break;
-        }
-    }
-    best.map(|(tour, _)| tour).ok_or(SimError::NoTour)
+    let rounds = (ROUNDS.0..=ROUNDS.1).step_by(3);
+    first_that_fits(name, seed, rounds.map(|rounds| design(name, seed, rounds)))
 }
 
 fn design(name: &str, seed: u64, rounds: usize) -> Result<Design, SimError> {
@@ -143,7 +134,7 @@ fn design(name: &str, seed: u64, rounds: usize) -> Result<Design, SimError> {
     }
     let (start, legs) = (walk.start, walk.legs);
     let returns: Return =
-        (0..4).map(|k| (format!("by door {}", (led + k) % 4 + 1), Quarter::turn(k as u8).pose())).collect();
+        (0..4).map(|k| (DOORS[(led + k + 4 - home) % 4].to_owned(), Quarter::turn(k as u8).pose())).collect();
     let aim = draw.within(AIM);
     let plain = Design::plain(world, start, legs);
     Ok(Design { returns: vec![returns], late_m: LATE_M, turn: Some(TURN), aim, ..plain })
