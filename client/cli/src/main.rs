@@ -1,17 +1,17 @@
 //! `toponym`: talk to a mapping server, ask it where things are, play logs to it.
 
-mod cli;
+mod commands;
 
 use clap::Parser;
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    let args = cli::Args::parse();
+    let args = commands::Args::parse();
     match tokio::runtime::Runtime::new() {
-        Ok(runtime) => runtime.block_on(cli::run(args)),
+        Ok(runtime) => runtime.block_on(commands::run(args)),
         Err(e) => {
             eprintln!("error: no threads: {e}");
-            ExitCode::from(cli::exit::NO_SERVER)
+            ExitCode::from(commands::exit::NO_SERVER)
         }
     }
 }

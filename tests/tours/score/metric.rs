@@ -5,6 +5,7 @@ use crate::graph::{Answer, Graphs};
 use crate::truth::{Named, Outline, Path, Question, Truth};
 use toponym_core::Pose2;
 use toponym_core::language::parse_query;
+use toponym_sim::geom::{Area, Point};
 
 /// An answer this near to a right room is right.
 const NEAR_M: f64 = 3.0;
@@ -90,19 +91,10 @@ fn is_right(answer: &Answer, rooms: &[Outline], true_from_map: &Pose2) -> bool {
 }
 
 /// How far a point is outside of an outline.
-fn distance_m(corners: &Outline, [x, y]: [f64; 2]) -> f64 {
-    let (mut inside, mut nearest_m) = (false, f64::INFINITY);
-    for (k, [ax, ay]) in corners.iter().enumerate() {
-        let [bx, by] = corners[(k + 1) % corners.len()];
-        if (*ay > y) != (by > y) && x < (bx - ax) * (y - ay) / (by - ay) + ax {
-            inside = !inside;
-        }
-        let (dx, dy) = (bx - ax, by - ay);
-        let length2 = dx * dx + dy * dy;
-        let f = if length2 > 0.0 { (((x - ax) * dx + (y - ay) * dy) / length2).clamp(0.0, 1.0) } else { 0.0 };
-        nearest_m = nearest_m.min((ax + f * dx - x).hypot(ay + f * dy - y));
-    }
-    if inside { 0.0 } else { nearest_m }
+fn distance_m(corners: &Outline, p: Point) -> f64 {
+    let area = Area { corners: corners.clone() };
+    let to_edge_m = || area.edges().map(|e| e.distance_m(p)).fold(f64::INFINITY, f64::min);
+    if area.contains(p, 0.0) { 0.0 } else { to_edge_m() }
 }
 
 #[cfg(test)]
