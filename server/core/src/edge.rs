@@ -8,8 +8,14 @@ pub type PlaceId = u64;
 /// Index of a place in the graph: the vertex v of the paper. Equal to its id.
 pub type Vertex = u32;
 
-/// Number of a revisit, never reused.
-pub type RevisitId = u32;
+/// Number of a question that graphs answer: has the robot been here before? Never reused.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub struct QuestionId {
+    /// The robot's boot, or segment of odometry, in which it was asked.
+    pub boot: u32,
+    /// Counts up.
+    pub n: u32,
+}
 
 /// How an edge between two places came about.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]

@@ -5,6 +5,7 @@ use crate::edge::Vertex;
 use crate::effects::{Effect, Effects, TrackState};
 use crate::event::{Odom, Scan, StampNs, Utterance};
 use crate::filter::Filter;
+use crate::filter::loops::Measured;
 use crate::filter::particle::{Edge, Particle};
 use crate::filter::propose::is_lost;
 use crate::geometry::Pose2;
@@ -164,7 +165,8 @@ impl Mapper {
         for place in frozen {
             let trial = self.trial.clone();
             self.change(effects, |filter, talk| {
-                let effects = filter.step(place, &|t, measured| trial.spoil(t, &mut measured.fits));
+                let spoil = |t, measured: &mut Measured| trial.spoil(t, &mut measured.fits);
+                let effects = filter.step(place, talk, &spoil);
                 trial.force(filter);
                 talk.reground(filter);
                 effects
@@ -208,7 +210,7 @@ impl Mapper {
         self.grow(frozen, effects);
         self.change(effects, |filter, talk| {
             talk.reground_all(filter);
-            filter.finish()
+            filter.finish(talk)
         });
     }
 
@@ -306,8 +308,8 @@ mod tests {
             kind: EdgeKind::Distance,
             i_from_j: Pose2::default(),
             covariance: Matrix3::identity(),
-            revisit: 0,
-            named: None,
+            question: crate::edge::QuestionId::default(),
+            log_looks: 0.0,
             factor: 0,
         };
         let other = mapper.filter.best().clone();

@@ -9,10 +9,8 @@ use rand_chacha::ChaCha8Rng;
 pub enum Purpose {
     /// Which older place is looked at.
     Propose,
-    /// Whether a particle takes an edge.
-    Edge,
-    /// Which particles survive.
-    Resample,
+    /// What a test draws.
+    Test,
     /// Which measurements are replaced by random ones, and by which.
     Inject,
 }

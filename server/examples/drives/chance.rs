@@ -10,11 +10,12 @@ use nalgebra::{Matrix3, Vector3};
 use std::collections::BTreeSet;
 use toponym_core::Pose2;
 use toponym_core::config::Config;
-use toponym_core::edge::{EdgeKind, Proposal, Vertex};
-use toponym_core::filter::chance::{LOOKS, log_looks, looks};
+use toponym_core::edge::{EdgeKind, Proposal, QuestionId, Vertex};
+use toponym_core::filter::chance::{LOOKS, log_chance, log_looks, looks};
 use toponym_core::filter::loops::{Fit, Loops};
+use toponym_core::filter::particle::Edge;
 use toponym_core::filter::propose::{LOST_SIGMA_M, NEAR_M, distance_probability, draw};
-use toponym_core::filter::weigh::{DENSITY_POWER, log_density_ratio, weigh};
+use toponym_core::filter::weigh::log_density;
 use toponym_core::random::{Purpose, uniform};
 use toponym_core::smoothing::Relative;
 use toponym_core::track::front::LOCAL_PATH_M;
@@ -37,7 +38,6 @@ struct Weighed {
     building: usize,
     is_true: bool,
     looks: [f64; 4],
-    prior: f64,
     log_density_ratio: f64,
     /// p(e = 1 | z) by the library.
     posterior: f64,
@@ -52,15 +52,13 @@ pub fn report(drives: &[Drive]) {
     let trues = weighed.iter().filter(|w| w.is_true).count();
     println!("{trues} true fits, {} by chance, {} buildings", weighed.len() - trues, names.len());
 
-    let odds = |w: &Weighed| (w.prior / (1.0 - w.prior)).ln();
-    let free: Vec<Example<5>> = examples(&weighed, odds, |w| {
+    let free: Vec<Example<5>> = examples(&weighed, |_| 0.0, |w| {
         let [a, b, c, d] = w.looks;
         [a, b, c, d, w.log_density_ratio]
     });
-    println!("LOOKS and DENSITY_POWER, learned together: {:.2?}", fit(&free, |_| true));
-    let given = |w: &Weighed| odds(w) + DENSITY_POWER * w.log_density_ratio;
-    let bound: Vec<Example<4>> = examples(&weighed, given, |w| w.looks);
-    println!("LOOKS, learned with DENSITY_POWER {DENSITY_POWER:.2}: {:.2?}", fit(&bound, |_| true));
+    println!("LOOKS and a power of the density, learned together: {:.2?}", fit(&free, |_| true));
+    let bound: Vec<Example<4>> = examples(&weighed, |w| w.log_density_ratio, |w| w.looks);
+    println!("LOOKS: {:.2?}", fit(&bound, |_| true));
     println!("LOOKS of the library: {LOOKS:.2?}");
 
     let mut held_out = vec![0.0; weighed.len()];
@@ -160,14 +158,17 @@ fn drifted(drive: &Drive, building: usize, drift_m: f64) -> Vec<Weighed> {
         };
         weighed.extend(fits.iter().filter_map(|f| {
             let predicted = predicted(f.i);
-            let prior = distance_probability(&predicted, config.gamma_per_m2).clamp(1e-3, 0.9);
+            let edge = Edge::of(f, t, QuestionId::default(), log_looks(f, fits.len()));
+            let turned_rad = edge.i_from_j.yaw_rad - predicted.i_from_a.yaw_rad;
+            let sigma_rad = (predicted.covariance[(2, 2)] + edge.covariance[(2, 2)]).sqrt();
+            let log_density_ratio =
+                (log_density(&predicted, &edge)?.0 - log_chance(turned_rad, sigma_rad)).clamp(-60.0, 60.0);
             Some(Weighed {
                 building,
                 is_true: is_true(f),
                 looks: looks(f, fits.len()),
-                prior,
-                log_density_ratio: log_density_ratio(&predicted, f)?.0.max(-60.0),
-                posterior: weigh(prior, &predicted, f, log_looks(f, fits.len()))?.posterior,
+                log_density_ratio,
+                posterior: 1.0 / (1.0 + (-log_density_ratio - edge.log_looks).exp()),
                 counts: 1.0,
             })
         }));

@@ -4,13 +4,10 @@
 //! toponym simulate drives/1 --plan PLAN.xml --lidar rplidar --people 4      # and so on
 //! cargo run --release -p toponym-server --example drives -- chance drives/*
 //! cargo run --release -p toponym-server --example drives -- coverage drives/*
-//! cargo run --release -p toponym-server --example drives -- overlap drives/*
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
 //! shows on buildings not learned from how often fits are true that are called so with some probability.
 //! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
-//! `overlap` learns how places that truly overlap see each other's surfaces and how those do that a false loop
-//! lays over one another (the core's `likelihood.rs`).
 //!
 //! A drive is a folder with `sim.rec` and `truth.json`, as `toponym simulate` makes them. Any log will do:
 //! `toponym-server serve --record` makes the one, `trajectory` rows `[t, x, y, yaw]` are the other.
@@ -20,7 +17,6 @@ mod chance;
 mod coverage;
 mod drive;
 mod logistic;
-mod overlap;
 
 use clap::{Parser, Subcommand};
 use drive::Drive;
@@ -49,12 +45,6 @@ enum What {
         #[arg(required = true)]
         drives: Vec<PathBuf>,
     },
-    /// What true overlaps and false ones show, and what that does to a weight.
-    Overlap {
-        /// Folders.
-        #[arg(required = true)]
-        drives: Vec<PathBuf>,
-    },
 }
 
 fn main() {
@@ -64,9 +54,5 @@ fn main() {
             chance::report(&drives);
         }
         What::Coverage { drives } => drives.iter().for_each(|d| coverage::report(&Drive::read(d))),
-        What::Overlap { drives } => {
-            let drives: Vec<Drive> = drives.iter().map(|d| Drive::read(d)).collect();
-            overlap::report(&drives);
-        }
     }
 }

@@ -8,7 +8,7 @@ use crate::edge::{PlaceId, Vertex};
 use crate::filter::Filter;
 use crate::filter::labels::LabelId;
 use crate::filter::particle::Particle;
-use crate::filter::resample::effective_sample_size;
+use crate::filter::prune::effective_sample_size;
 use crate::geometry::Pose2;
 use crate::graph::Place;
 use crate::language::{self, Name};
@@ -123,7 +123,7 @@ impl Snapshot {
             i_from_j: e.i_from_j,
         });
         ParticleView {
-            count: p.count,
+            count: 1,
             weight: p.weight(),
             edges: edges.collect(),
             poses: poses(p, &self.places, &self.open),

@@ -108,6 +108,8 @@ pub struct Refusal {
 pub struct Measured {
     /// Supported fits, one per revisit.
     pub fits: Vec<Fit>,
+    /// Older places that were looked at, each with the ways in which it looks like this one.
+    pub looked: Vec<(Vertex, Vec<Pose2>)>,
     /// What did not fit.
     pub refused: Vec<Refusal>,
 }
@@ -135,7 +137,10 @@ impl Loops {
     pub fn measure(&mut self, graph: &mut Graph, t: Vertex, proposals: &[Proposal]) -> Measured {
         let mut measured = Measured::default();
         let leads: Vec<Lead> = self.followed.iter().filter_map(|f| lead(graph, f, t)).collect();
-        let mut fits: Vec<Fit> = leads.par_iter().filter_map(|l| follow(graph, t, l)).collect();
+        let found: Vec<Option<Fit>> = leads.par_iter().map(|l| follow(graph, t, l)).collect();
+        let seen = |(l, f): (&Lead, &Option<Fit>)| (l.i, f.iter().map(|f| f.mode.i_from_j).collect());
+        measured.looked.extend(leads.iter().zip(&found).map(seen));
+        let mut fits: Vec<Fit> = found.into_iter().flatten().collect();
         fits.extend(matched(graph, t, proposals, &mut measured));
         let mut fits = supported(graph, t, fits, &mut measured);
         fits.retain(|f| f.supported() || f.age < UNSUPPORTED_MAX);
@@ -165,6 +170,8 @@ fn matched(graph: &mut Graph, t: Vertex, proposals: &[Proposal], measured: &mut 
     for p in proposals {
         // What is not matched now is proposed again from the next place, a metre on.
         let Some(Matched { modes: found }) = graph.memo.get(&(p.i, t)) else { continue };
+        let alike = found.iter().filter(|m| looks_alike(m)).map(|m| m.i_from_j).collect();
+        measured.looked.push((p.i, alike));
         measured.refused.extend(refusal(p, t, found));
         let named = (p.kind == EdgeKind::Semantic).then_some((p.i, t));
         let fit =

@@ -3,31 +3,36 @@
 //! One step per place, when the robot has left it. Particles hold p(G, X, L | z, u, λ) =
 //! p(L | X, G, z, u, λ) · p(X | G, z, u, λ) · p(G | z, u, λ), eq. (2).
 
+pub mod absence;
+pub mod answer;
 pub mod chance;
-pub mod decide;
+pub mod ghosts;
 pub mod labels;
-pub mod likelihood;
 pub mod loops;
 pub mod particle;
 pub mod propose;
-pub mod resample;
-pub mod revisit;
+pub mod prune;
+pub mod question;
+mod reopen;
 pub(crate) mod second_look;
 pub mod weigh;
+pub mod words;
 
 use crate::config::Config;
 use crate::edge::{EdgeKind, Proposal, Vertex};
 use crate::effects::{Effect, Effects};
-use crate::filter::chance::log_looks;
-use crate::filter::decide::{Choice, add_edge, choose};
-use crate::filter::likelihood::weigh_overlaps;
+use crate::filter::absence::pay;
+use crate::filter::answer::{Child, Stance, born, children, stance};
+use crate::filter::chance::{log_add, log_looks};
+use crate::filter::ghosts::{Ghost, Ghosts};
 use crate::filter::loops::{Fit, Loops, Measured, measure_again};
-use crate::filter::particle::Particle;
+use crate::filter::particle::{Edge, Particle};
 use crate::filter::propose::propose;
-use crate::filter::resample::{effective_sample_size, is_wasteful, merge, normalise, resample};
-use crate::filter::revisit::{Revisits, Testimony};
+use crate::filter::prune::{KEPT_MIN, effective_sample_size, keep_best, merge, normalise, rank};
+use crate::filter::question::{Questions, Testimony};
 use crate::filter::second_look::SecondLooks;
 use crate::filter::weigh::{Judgement, judge};
+use crate::filter::words::Words;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
 use crate::smoothing::{FactorId, SmoothError, Structure};
@@ -35,7 +40,7 @@ use crate::track::front::{Chain, FrozenPlace};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Edges of a place that tell no particle anything new: they are measurements still, but who comes for the
@@ -54,48 +59,50 @@ pub struct Filter {
     /// Distinct particles, best first; weights sum to one.
     pub particles: Vec<Particle>,
     loops: Loops,
-    revisits: Revisits,
+    questions: Questions,
+    /// What was dropped.
+    ghosts: Ghosts,
     /// Factors that some particles hold and others don't.
     disputed: Vec<FactorId>,
     second_looks: SecondLooks,
 }
 
 impl Filter {
-    /// N equal particles with nothing in them.
+    /// One particle with nothing in it.
     pub fn new(config: Config) -> Self {
-        let particles = vec![Particle::empty(config.particles.max(1))];
         Self {
             config,
             graph: Graph::default(),
             structure: Arc::default(),
-            particles,
+            particles: vec![Particle::empty()],
             loops: Loops::default(),
-            revisits: Revisits::default(),
+            questions: Questions::default(),
+            ghosts: Ghosts::default(),
             disputed: Vec::new(),
             second_looks: SecondLooks::default(),
         }
     }
 
-    /// Algorithm 1 for a place just left. What sentences say of it comes through [`crate::talk`]. A trial may
+    /// Algorithm 1 for a place just left. What sentences say of graphs comes by `words`. A trial may
     /// `spoil` what was measured, to see the filter survive it.
-    pub fn step(&mut self, frozen: FrozenPlace, spoil: &dyn Fn(Vertex, &mut Measured)) -> Effects {
+    pub fn step(
+        &mut self,
+        frozen: FrozenPlace,
+        words: &dyn Words,
+        spoil: &dyn Fn(Vertex, &mut Measured),
+    ) -> Effects {
         let chain = frozen.open.chain;
         let t = self.graph.add(frozen); // v_t
         self.extend(&chain); // its edge to v_{t-1}
         let proposals = if self.config.loops { self.propose(t) } else { Vec::new() }; // 1. edges e_tj, (5–9)
         let mut measured = self.loops.measure(&mut self.graph, t, &proposals); // z_t, each pair once
         spoil(t, &mut measured);
-        let mut effects = self.weigh_measured(t, &measured); // 1–4: G, X, L and w, (10), (17–18)
-        effects.extend(self.look_again()); // the same for a place that was named since it was left
-        weigh_overlaps(&self.graph, &self.structure, &mut self.particles, t); // 4. w where nothing fitted, (18)
-        normalise(&mut self.particles);
-        self.particles = merge(std::mem::take(&mut self.particles));
+        let mut effects = self.answer_all(t, &measured, words); // 1–4: G, X, L and w, (10), (17–18)
+        effects.extend(self.look_again(words)); // the same for a place that was named since it was left
+        self.pay_missed(t, &measured); // 4. w where nothing was found, (18)
+        effects.extend(self.reopen(words)); // what was dropped comes back where it became likely
         let size = effective_sample_size(&self.particles);
-        let n = self.config.particles.max(1);
-        if is_wasteful(&self.particles, n, self.config.resample_below) {
-            self.particles = resample(std::mem::take(&mut self.particles), n, self.config.seed, t);
-            effects.push(Effect::Resampled { effective_sample_size: size });
-        }
+        self.keep_best(); // normalise; in place of resampling: the N best, without a draw
         self.forget();
         effects.push(self.weighed(t, proposals, size));
         effects
@@ -106,9 +113,28 @@ impl Filter {
             place: t.into(),
             stamp_ns: self.graph.place(t).stamp_ns,
             proposed,
-            weights: self.particles.iter().map(|p| (p.count, p.weight())).collect(),
+            weights: self.particles.iter().map(|p| (1, p.weight())).collect(),
             effective_sample_size,
         }
+    }
+
+    /// Posterior mass of the graphs that were dropped. The weights of the particles sum to one among
+    /// themselves.
+    pub fn unresolved(&self) -> f64 {
+        self.ghosts.unresolved()
+    }
+
+    /// Weighs every particle anew by what was said.
+    pub fn weigh_words(&mut self, words: &dyn Words) {
+        let before = self.best().log_words;
+        self.particles.par_iter_mut().for_each(|p| {
+            let log_words = words.log_likelihood(p);
+            p.log_weight += log_words - p.log_words;
+            p.log_words = log_words;
+        });
+        self.rank();
+        // A sentence that the kept graphs did not expect speaks for what was dropped.
+        self.ghosts.kept_gained((self.best().log_words - before).min(0.0));
     }
 
     /// The best particle.
@@ -123,19 +149,20 @@ impl Filter {
     }
 
     /// All that is left to do when no more comes: what waits for a second look gets it.
-    pub fn finish(&mut self) -> Effects {
+    pub fn finish(&mut self, words: &dyn Words) -> Effects {
         let mut effects = Effects::new();
         while let Some(v) = self.second_looks.next() {
-            effects.extend(self.look_again_from(v));
+            effects.extend(self.look_again_from(v, words));
         }
-        self.rank();
+        effects.extend(self.reopen(words));
+        self.keep_best();
         effects
     }
 
     /// Weights that sum to one, the best particle first.
     pub fn rank(&mut self) {
         normalise(&mut self.particles);
-        self.particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+        rank(&mut self.particles);
     }
 
     /// Places whose names have changed wait for a second look. One not left yet needs none: its first is
@@ -147,42 +174,30 @@ impl Filter {
         }
     }
 
-    /// Pairs whose names led to revisits, and still would.
-    pub fn led_by_names(&self) -> BTreeSet<(Vertex, Vertex)> {
-        second_look::led_by_names(&self.particles)
-    }
-
-    /// Judges again the revisits, of those that names led to, whose names were taken back. Returns how many
-    /// revisits some particle gave up.
-    pub fn judge_again(&mut self, led: BTreeSet<(Vertex, Vertex)>) -> usize {
-        let Self { particles, graph, structure, .. } = self;
-        let given_up = second_look::judge_again(particles, graph, structure, self.config.gamma_per_m2, led);
-        self.disputed.extend(given_up.disputed);
-        self.disputed.sort_unstable();
-        self.disputed.dedup();
-        self.forget();
-        given_up.revisits
-    }
-
     /// Puts an edge into the graph of every particle, whatever speaks against it: a trial, see
-    /// [`crate::trial`].
+    /// [`crate::trial`]. The other answer is dropped, not forgotten.
     pub fn impose(&mut self, t: Vertex, fit: &Fit) {
-        let revisit = self.revisits.see(&self.graph, fit, t, 0.0).revisit;
-        let Some(edge) = add_edge(Arc::make_mut(&mut self.structure), fit, revisit, t) else { return };
-        self.particles.iter_mut().for_each(|p| p.take(edge.clone()));
+        let looks = log_looks(fit, 1);
+        let question = self.questions.see(&self.graph, fit, t, looks).question;
+        let edge = Edge::of(fit, t, question, looks);
+        let judged = judge(&self.graph, &self.structure, self.best(), &edge);
+        let Some(edge) = edge.enter(Arc::make_mut(&mut self.structure)) else { return };
+        let log_odds = -judged.map_or(0.0, |j| j.log_there);
+        self.ghosts.drop_answer(Ghost { edge: edge.clone(), there: false, log_odds, since: 0.0 });
+        self.particles.iter_mut().for_each(|p| p.add(edge.clone()));
         self.update();
     }
 
     /// Looks at the pairs that the names of one place that waits propose by now.
-    fn look_again(&mut self) -> Effects {
-        self.second_looks.next().map_or_else(Effects::new, |v| self.look_again_from(v))
+    fn look_again(&mut self, words: &dyn Words) -> Effects {
+        self.second_looks.next().map_or_else(Effects::new, |v| self.look_again_from(v, words))
     }
 
-    fn look_again_from(&mut self, v: Vertex) -> Effects {
+    fn look_again_from(&mut self, v: Vertex, words: &dyn Words) -> Effects {
         let mut effects = Effects::new();
         for (t, proposal) in second_look::pairs(&self.config, &self.graph, &self.particles, v) {
             let measured = measure_again(&mut self.graph, t, &[proposal]);
-            effects.extend(self.weigh_measured(t, &measured));
+            effects.extend(self.answer_all(t, &measured, words));
         }
         effects
     }
@@ -227,59 +242,94 @@ impl Filter {
         union.into_values().collect()
     }
 
-    /// All that was measured at place t.
-    fn weigh_measured(&mut self, t: Vertex, measured: &Measured) -> Effects {
+    /// Answers to all that was measured at place t.
+    fn answer_all(&mut self, t: Vertex, measured: &Measured, words: &dyn Words) -> Effects {
         let mut effects = refusals(t, measured);
         let (fits, mut known) = (measured.fits.len(), 0);
         for fit in &measured.fits {
-            let testimony = self.revisits.see(&self.graph, fit, t, log_looks(fit, fits));
-            let judged = self.judge(t, fit, &testimony); // (17–18)
+            let testimony = self.questions.see(&self.graph, fit, t, log_looks(fit, fits));
+            let edge = Edge::of(fit, t, testimony.question, testimony.log_looks);
+            let (stances, judged) = self.stances(&edge, &testimony);
+            self.ghosts.gain(testimony.question, testimony.gained);
             let news = fit.kind == EdgeKind::Semantic || !judged.iter().all(|j| j.is_some_and(|j| j.known));
             known += usize::from(!news);
-            effects.push(if news || known <= KNOWN_MAX {
-                self.take_or_refuse(t, fit, &testimony, &judged)
-            } else {
-                surplus(t, fit)
-            });
+            let wanted = news || known <= KNOWN_MAX;
+            let share = self.answer(edge, &stances, wanted, words);
+            effects.push(report(t, fit, share, judged.first().and_then(Option::as_ref)));
         }
         for p in &mut self.particles {
-            p.refused.retain(|&id| self.revisits.remembers(id));
+            p.refused.retain(|&id| self.questions.remembers(id));
         }
         effects
     }
 
-    fn judge(&self, t: Vertex, fit: &Fit, testimony: &Testimony) -> Vec<Option<Judgement>> {
-        let (structure, config) = (&self.structure, &self.config);
-        let judge = |p: &Particle| judge(structure, p, fit, t, testimony, config.gamma_per_m2);
-        self.particles.par_iter().map(judge).collect()
+    /// Where each particle stands towards an edge, and what it thinks of it.
+    fn stances(&self, edge: &Edge, testimony: &Testimony) -> (Vec<Stance>, Vec<Option<Judgement>>) {
+        let Self { graph, structure, questions, .. } = self;
+        let of = |p: &Particle| {
+            let judgement = judge(graph, structure, p, edge);
+            let stands = p.taken.iter().rev().any(|&q| questions.is_fresh(graph, q, edge.j));
+            let others = questions.at(graph, edge.j).filter(|q| q.id != testimony.question);
+            (stance(graph, p, edge, testimony, judgement, stands, others), judgement)
+        };
+        self.particles.par_iter().map(of).collect::<Vec<_>>().into_iter().unzip()
     }
 
-    /// Each particle takes the edge of a fit or refuses it, and is weighed by the fit.
-    fn take_or_refuse(
-        &mut self,
-        t: Vertex,
-        fit: &Fit,
-        testimony: &Testimony,
-        judged: &[Option<Judgement>],
-    ) -> Effect {
-        let relief = judged.iter().flatten().map(|j| j.log_evidence).fold(f64::NEG_INFINITY, f64::max);
-        let draw = |k| (self.config.seed, k as u64);
-        let mut choices: Vec<Choice> = std::mem::take(&mut self.particles)
-            .into_iter()
-            .zip(judged)
-            .enumerate()
-            .map(|(k, (p, judgement))| choose(p, fit, testimony.revisit, *judgement, relief, t, draw(k)))
-            .collect(); // G and w
-        let wanted = choices.iter().any(|c| c.taken.is_some());
-        let edge =
-            wanted.then(|| add_edge(Arc::make_mut(&mut self.structure), fit, testimony.revisit, t)).flatten();
-        self.disputed.extend(edge.iter().map(|e| e.factor));
-        choices.par_iter_mut().for_each(|c| c.take(&self.structure, edge.as_ref())); // X, (10)
-        let share = share_taken(&choices);
-        self.particles = choices.into_iter().flat_map(|c| [c.taken, c.refused]).flatten().collect();
-        self.particles.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
-        self.update(); // X of those who refuse
-        report(t, fit, share, judged.iter().flatten().next())
+    /// The best of all answers become the particles; the others are dropped. Returns the posterior share of
+    /// those that hold the edge.
+    fn answer(&mut self, edge: Edge, stances: &[Stance], wanted: bool, words: &dyn Words) -> f64 {
+        let mut all = children(&self.particles, stances);
+        if let Some(Stance::There { log_gain, .. }) = stances.first() {
+            self.ghosts.kept_gained(*log_gain);
+        }
+        let log_sum = all.iter().map(|c| c.log_weight).fold(f64::NEG_INFINITY, log_add);
+        let worth = all.partition_point(|c| c.log_weight >= log_sum + KEPT_MIN.ln());
+        let dropped = all.split_off(worth.min(self.config.particles.max(1) as usize).max(1));
+        for child in dropped.iter().filter(|c| matches!(stances[c.parent], Stance::Open { .. })) {
+            let log_odds = child.log_weight - log_sum;
+            self.ghosts.drop_answer(Ghost { edge: edge.clone(), there: child.there, log_odds, since: 0.0 });
+        }
+        let adds = |c: &Child| c.there && c.adds && (wanted || matches!(stances[c.parent], Stance::Open { .. }));
+        let entered = if all.iter().any(adds) {
+            edge.clone().enter(Arc::make_mut(&mut self.structure))
+        } else {
+            None
+        };
+        self.disputed.extend(entered.iter().map(|e| e.factor));
+        let (structure, parents, question) = (&self.structure, &self.particles, edge.question);
+        let birth = |c: &Child| {
+            let edge = entered.as_ref().filter(|_| adds(c));
+            born(&parents[c.parent], c, question, edge, structure, words)
+        };
+        let particles: Vec<Particle> = all.par_iter().filter_map(birth).collect();
+        let there = |p: &&Particle| p.holds(edge.question);
+        self.particles = particles;
+        self.rank();
+        self.update(); // X of those who answer "elsewhere"
+        self.particles.iter().filter(there).map(Particle::weight).sum()
+    }
+
+    /// Who expected place t to look like one that was looked at, and nothing was found, pays.
+    fn pay_missed(&mut self, t: Vertex, measured: &Measured) {
+        let (graph, structure) = (&self.graph, &self.structure);
+        let paid: Vec<f64> =
+            self.particles.par_iter_mut().map(|p| pay(graph, structure, p, t, &measured.looked)).collect();
+        self.ghosts.kept_gained(paid[0]);
+        for (p, log) in self.particles.iter_mut().zip(paid) {
+            p.log_weight += log;
+        }
+    }
+
+    /// Merges particles that say the same and keeps the best; what tells the others from the best of all is
+    /// dropped, not forgotten.
+    fn keep_best(&mut self) {
+        normalise(&mut self.particles);
+        self.particles = merge(&self.structure, std::mem::take(&mut self.particles));
+        let dropped = keep_best(&mut self.particles, self.config.particles.max(1) as usize);
+        let best = &self.particles[0];
+        let ghosts = dropped.iter().filter_map(|p| difference(p, best));
+        ghosts.for_each(|g| self.ghosts.drop_answer(g));
+        self.ghosts.forget();
     }
 
     /// Takes out the factors that no particle holds any more.
@@ -295,19 +345,22 @@ impl Filter {
     }
 }
 
-/// Share of the posterior that took the edge.
-fn share_taken(choices: &[Choice]) -> f64 {
-    let all = || choices.iter().flat_map(|c| [&c.taken, &c.refused]).flatten();
-    let top = all().map(|p| p.log_weight).fold(f64::NEG_INFINITY, f64::max);
-    let mass = |p: &Particle| (p.log_weight - top).exp();
-    choices.iter().flat_map(|c| &c.taken).map(mass).sum::<f64>() / all().map(mass).sum::<f64>()
+/// The newest answer that tells a dropped particle from the best: with odds as if it weighed alone.
+fn difference(dropped: &Particle, best: &Particle) -> Option<Ghost> {
+    let edge_of = |p: &Particle, other: &Particle| {
+        p.edges.iter().filter(|e| !other.holds(e.question)).max_by_key(|e| e.question).cloned()
+    };
+    let (theirs, ours) = (edge_of(dropped, best), edge_of(best, dropped));
+    let there = theirs.as_ref().map(|e| e.question) > ours.as_ref().map(|e| e.question);
+    let edge = if there { theirs } else { ours }?;
+    Some(Ghost { edge, there, log_odds: dropped.log_weight, since: 0.0 })
 }
 
 fn report(t: Vertex, fit: &Fit, weight: f64, best: Option<&Judgement>) -> Effect {
-    let (posterior, distance) = best.map_or((0.0, f64::NAN), |j| (j.posterior, j.distance2.sqrt()));
+    let (log_there, distance) = best.map_or((f64::NAN, f64::NAN), |j| (j.log_there, j.distance2.sqrt()));
     let figures = format!(
         "score {:.2}, overlap {:.2}, {} places over {:.0} m agree, {distance:.1} σ from prediction, \
-         p = {posterior:.3}",
+         log odds {log_there:.1}",
         fit.mode.score, fit.mode.overlap, fit.support, fit.support_path_m
     );
     let (i, j, kind) = (fit.i.into(), t.into(), fit.kind);
@@ -316,11 +369,6 @@ fn report(t: Vertex, fit: &Fit, weight: f64, best: Option<&Judgement>) -> Effect
     } else {
         Effect::EdgeRefused { i, j, kind, reason: format!("edge {t}–{i} refused by all: {figures}") }
     }
-}
-
-fn surplus(t: Vertex, fit: &Fit) -> Effect {
-    let reason = format!("edge {t}–{} left out: all know it, and {KNOWN_MAX} others say it", fit.i);
-    Effect::EdgeRefused { i: fit.i.into(), j: t.into(), kind: fit.kind, reason }
 }
 
 fn refusals(t: Vertex, measured: &Measured) -> Effects {

@@ -1,12 +1,12 @@
-//! A particle: {G, X, L, w} of eq. (4). Equal particles are one, with a count.
+//! A particle: {G, X, L, w} of eq. (4). No two are equal.
 
-use crate::edge::{EdgeKind, RevisitId, Vertex};
+use crate::edge::{EdgeKind, QuestionId, Vertex};
 use crate::filter::labels::Labels;
+use crate::filter::loops::Fit;
 use crate::geometry::Pose2;
-use crate::smoothing::{Belief, FactorId, SmoothError, Structure};
+use crate::smoothing::{Belief, Factor, FactorId, SmoothError, Structure};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// An edge says that two places are one only if they lie this near; scans tie farther ones too.
@@ -23,85 +23,124 @@ pub struct Edge {
     pub kind: EdgeKind,
     /// Measured transform.
     pub i_from_j: Pose2,
-    /// Covariance of it, right perturbation.
+    /// R: covariance of it, right perturbation.
     pub covariance: Matrix3<f64>,
-    /// The revisit that it is of.
-    pub revisit: RevisitId,
-    /// The pair (older, newer) whose names led to the revisit, if any did.
-    pub named: Option<(Vertex, Vertex)>,
-    /// Its factor in the structure that all particles share.
+    /// The question that it answers.
+    pub question: QuestionId,
+    /// log r of its looks, see [`crate::filter::chance`].
+    pub log_looks: f64,
+    /// Its factor in the structure that all particles share, once it has one.
     pub factor: FactorId,
 }
 
-/// Sentences whose share in the weight can be taken back.
-const SAID_MAX: usize = 64;
+/// Places' content overlaps along the path: an edge per place uses each scan some three times, so
+/// its information is a third.
+const SHARED_SCANS: f64 = 3.0;
 
-/// Equal particles.
+impl Edge {
+    /// The edge of a fit of place `t`, without a factor yet.
+    pub fn of(fit: &Fit, t: Vertex, question: QuestionId, log_looks: f64) -> Self {
+        Self {
+            i: fit.i,
+            j: t,
+            kind: fit.kind,
+            i_from_j: fit.mode.i_from_j,
+            covariance: fit.mode.covariance * SHARED_SCANS,
+            question,
+            log_looks,
+            factor: FactorId::MAX,
+        }
+    }
+
+    /// Gives it a factor in what all particles share; none of them holds it yet. None if its numbers are no
+    /// measurement.
+    pub fn enter(mut self, structure: &mut Structure) -> Option<Self> {
+        let information = self.covariance.try_inverse()?;
+        let information = (information + information.transpose()) * 0.5;
+        let factor = Factor { i: self.i, j: self.j, i_from_j: self.i_from_j, information };
+        self.factor = structure.add_factor(factor).ok()?;
+        structure.arrange();
+        Some(self)
+    }
+}
+
+/// One assignment of answers to questions, with what follows from it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Particle {
     /// G: loop edges in the order they were added.
     pub edges: Arc<Vec<Edge>>,
-    /// The revisits that G's loop edges are of, in order.
-    pub taken: Arc<Vec<RevisitId>>,
-    /// Revisits of late that were decided against.
-    pub refused: Vec<RevisitId>,
+    /// The questions that G's loop edges answer, in order.
+    pub taken: Arc<Vec<QuestionId>>,
+    /// Questions of late that were answered by "elsewhere".
+    pub refused: Vec<QuestionId>,
     /// X.
     pub belief: Belief,
     /// L.
     pub labels: Labels,
-    /// What the newest sentences added to log w, by utterance: to take them back.
-    pub said: Arc<Vec<(u32, f64)>>,
-    /// log w of all of them together; normalised after each step.
+    /// What people said, as a share of log w, see [`crate::filter::words`].
+    pub log_words: f64,
+    /// log w; normalised after each step.
     pub log_weight: f64,
-    /// How many they are.
-    pub count: u32,
-    /// Refused a fresh semantic edge: kept until this place, whatever its weight.
-    pub kept_until: Vertex,
+    /// Path at which it last paid for a fit that it expected and nobody found, metres.
+    pub missed_at_m: Option<f64>,
 }
 
 impl Particle {
-    /// `count` particles with nothing in them.
-    pub fn empty(count: u32) -> Self {
+    /// With nothing in it.
+    pub fn empty() -> Self {
         Self {
             edges: Arc::default(),
             taken: Arc::default(),
             refused: Vec::new(),
             belief: Belief::new(),
             labels: Labels::default(),
-            said: Arc::default(),
+            log_words: 0.0,
             log_weight: 0.0,
-            count,
-            kept_until: 0,
+            missed_at_m: None,
         }
     }
 
-    /// Whether G has an edge of a revisit.
-    pub fn holds(&self, revisit: RevisitId) -> bool {
-        self.taken.binary_search(&revisit).is_ok()
+    /// Whether its answer to a question is "there".
+    pub fn holds(&self, question: QuestionId) -> bool {
+        self.taken.binary_search(&question).is_ok()
+    }
+
+    /// Answers a question by "there".
+    pub fn take(&mut self, question: QuestionId) {
+        if let Err(at) = self.taken.binary_search(&question) {
+            Arc::make_mut(&mut self.taken).insert(at, question);
+        }
+    }
+
+    /// Answers a question by "elsewhere".
+    pub fn refuse(&mut self, question: QuestionId) {
+        if !self.refused.contains(&question) {
+            self.refused.push(question);
+        }
     }
 
     /// Adds an edge to G, and what it says of labels to L; X follows at the next update.
-    pub fn take(&mut self, edge: Edge) {
+    pub fn add(&mut self, edge: Edge) {
         self.belief.hold(edge.factor);
         if edge.i_from_j.x_m.hypot(edge.i_from_j.y_m) < SAME_PLACE_M {
             self.labels.carry_over(edge.i, edge.j);
         }
-        if let Err(at) = self.taken.binary_search(&edge.revisit) {
-            Arc::make_mut(&mut self.taken).insert(at, edge.revisit);
-        }
+        self.take(edge.question);
         Arc::make_mut(&mut self.edges).push(edge);
     }
 
-    /// Takes edges out of G, and what was carried over them out of L; X follows at the next update.
-    pub fn give_up(&mut self, unwanted: impl Fn(&Edge) -> bool) {
-        let (gone, kept): (Vec<Edge>, Vec<Edge>) = self.edges.iter().cloned().partition(unwanted);
+    /// Takes a question's edges out of G, and what was carried over them out of L; the answer is "elsewhere"
+    /// then. X follows at the next update.
+    pub fn give_up(&mut self, question: QuestionId) {
+        let (gone, kept): (Vec<Edge>, Vec<Edge>) =
+            self.edges.iter().cloned().partition(|e| e.question == question);
         for edge in &gone {
             self.belief.release(edge.factor);
             self.labels.carry_back(edge.i, edge.j);
         }
-        let taken: BTreeSet<RevisitId> = kept.iter().map(|e| e.revisit).collect();
-        self.taken = Arc::new(taken.into_iter().collect());
+        Arc::make_mut(&mut self.taken).retain(|&q| q != question);
         self.edges = Arc::new(kept);
+        self.refuse(question);
     }
 
     /// X given G, eq. (10). On an error poses stay where they were, and covariances are unknown.
@@ -116,35 +155,19 @@ impl Particle {
     }
 
     /// Weighs by what a sentence says for or against this graph; see [`crate::talk::predictive`].
-    pub fn weigh_by_words(&mut self, utterance: u32, log_ratio: f64) {
+    pub fn weigh_by_words(&mut self, _utterance: u32, log_ratio: f64) {
         self.log_weight += log_ratio;
-        let said = Arc::make_mut(&mut self.said);
-        match said.iter_mut().find(|(u, _)| *u == utterance) {
-            Some((_, sum)) => *sum += log_ratio,
-            None => said.push((utterance, log_ratio)),
-        }
-        if said.len() > SAID_MAX {
-            said.remove(0);
-        }
+        self.log_words += log_ratio;
     }
 
-    /// Takes back what an utterance put into labels and weight. For the edges that it proposed see
-    /// [`crate::filter::second_look`].
+    /// Takes back what an utterance put into labels.
     pub fn revoke(&mut self, utterance: u32) {
         self.labels.revoke(utterance);
-        if let Some(at) = self.said.iter().position(|(u, _)| *u == utterance) {
-            self.log_weight -= Arc::make_mut(&mut self.said).remove(at).1;
-        }
     }
 
-    /// w of all of them together.
+    /// w.
     pub fn weight(&self) -> f64 {
         self.log_weight.exp()
-    }
-
-    /// Whether two believe in the same revisits. Which of a revisit's fits became edges is no difference.
-    pub fn same_graph(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.taken, &other.taken) || self.taken == other.taken
     }
 }
 
@@ -153,36 +176,24 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_revisit_is_taken_while_one_of_its_edges_is_held() {
-        let mut p = Particle::empty(1);
-        for (factor, revisit) in [4, 2, 4].into_iter().enumerate() {
-            p.take(Edge {
+    fn a_question_is_answered_whether_or_not_it_has_edges() {
+        let mut p = Particle::empty();
+        let id = |n| QuestionId { boot: 0, n };
+        for (factor, n) in [4, 2, 4].into_iter().enumerate() {
+            p.add(Edge {
                 i: 0,
                 j: 9,
                 kind: EdgeKind::Distance,
                 i_from_j: Pose2::default(),
                 covariance: Matrix3::identity(),
-                revisit,
-                named: None,
+                question: id(n),
+                log_looks: 0.0,
                 factor: factor as FactorId,
             });
         }
-        assert_eq!(p.taken[..], [2, 4]);
-        p.give_up(|e| e.factor == 0);
-        assert_eq!(p.taken[..], [2, 4]);
-        p.give_up(|e| e.revisit == 4);
-        assert_eq!(p.taken[..], [2]);
-    }
-
-    #[test]
-    fn a_sentence_taken_back_takes_its_weight_along_and_no_other() {
-        let mut p = Particle::empty(1);
-        for (utterance, log_ratio) in [(0, -0.5), (1, 0.25), (0, -0.25)] {
-            p.weigh_by_words(utterance, log_ratio);
-        }
-        p.revoke(0);
-        assert!((p.log_weight - 0.25).abs() < 1e-12);
-        p.revoke(0);
-        assert!((p.log_weight - 0.25).abs() < 1e-12, "once");
+        p.take(id(7));
+        assert_eq!(p.taken[..], [id(2), id(4), id(7)]);
+        p.give_up(id(4));
+        assert_eq!((&p.taken[..], p.edges.len(), &p.refused[..]), (&[id(2), id(7)][..], 1, &[id(4)][..]));
     }
 }

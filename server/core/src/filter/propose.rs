@@ -83,7 +83,12 @@ pub fn propose(
     let marginal = belief.marginal(structure, t);
     let sigma_m = marginal[(0, 0)].max(marginal[(1, 1)]).sqrt();
     // What is being followed needs no second look; words do get one, wherever they point.
-    let older = (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M) && !followed(i));
+    if graph.place(t).content.is_bare() {
+        return Vec::new();
+    }
+    let older = (0..t).filter(|&i| {
+        graph.apart(i, t, LOCAL_PATH_M) && !graph.place(i).content.is_bare() && !followed(i)
+    });
     let lost = is_lost(graph, structure, belief, t);
     let here = belief.pose(t);
     let within_m = NEAR_M + 3.0 * sigma_m.min(LOST_SIGMA_M);
@@ -113,7 +118,7 @@ pub fn propose(
         let matchable = |i| i < t && graph.apart(i, t, LOCAL_PATH_M);
         merge_semantic(&mut proposals, particle.labels.similar(t), matchable);
     }
-    draw(config.seed, graph, t, particle.count, proposals)
+    draw(config.seed, graph, t, config.particles, proposals)
 }
 
 /// What equal particles would look at for the names of a place, wherever the robot is now: any other
@@ -127,7 +132,7 @@ pub fn propose_named(config: &Config, graph: &Graph, particle: &Particle, v: Ver
     merge_semantic(&mut proposals, particle.labels.similar(v), |i| {
         i < left && graph.apart(i, v, LOCAL_PATH_M)
     });
-    draw(config.seed, graph, v, particle.count, proposals)
+    draw(config.seed, graph, v, config.particles, proposals)
 }
 
 /// Eqs. (8–9): an edge that the words propose too is a semantic one, of either's probability.

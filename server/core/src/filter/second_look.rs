@@ -1,19 +1,14 @@
-//! Steps 1 and 4 once more, for places that the robot left long ago: where names came late, they may
-//! still propose edges; where names were taken back, the revisits that they had led to are judged again.
+//! Step 1 once more, for places that the robot left long ago: where names came late, they may still propose
+//! edges.
 
 use crate::config::Config;
 use crate::edge::{EdgeKind, Proposal, Vertex};
-use crate::filter::chance::log_looks;
 use crate::filter::labels::Evidence;
-use crate::filter::loops::{Fit, measure_again};
 use crate::filter::particle::Particle;
-use crate::filter::propose::{SIMILARITY_MIN, propose_named};
-use crate::filter::weigh::judge_alone;
+use crate::filter::propose::propose_named;
 use crate::graph::Graph;
-use crate::smoothing::{FactorId, Structure};
-use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::{BTreeMap, VecDeque};
 
 /// Places named anew that wait for their turn; the oldest give way.
 const WAITING_MAX: usize = 256;
@@ -64,53 +59,6 @@ fn tied(particles: &[Particle], a: Vertex, b: Vertex) -> bool {
     particles.iter().any(|p| p.edges.iter().any(|e| (e.i, e.j) == pair))
 }
 
-/// Pairs whose names led to revisits, and still would.
-pub fn led_by_names(particles: &[Particle]) -> BTreeSet<(Vertex, Vertex)> {
-    let of = |p: &Particle| -> BTreeSet<(Vertex, Vertex)> {
-        p.edges.iter().filter_map(|e| e.named).filter(|&pair| !unnamed(p, pair)).collect()
-    };
-    particles.iter().flat_map(of).collect()
-}
-
-/// What judging again has changed.
-pub struct GivenUp {
-    /// Revisits that some particle gave up.
-    pub revisits: usize,
-    /// Factors that not all particles hold any more.
-    pub disputed: Vec<FactorId>,
-}
-
-/// Judges again the revisits, of those that names led to, whose names were taken back: who would not have
-/// taken the edge for the distance alone gives up all edges of the revisit. Weights stay: what the scans
-/// said they still say.
-pub fn judge_again(
-    particles: &mut [Particle],
-    graph: &mut Graph,
-    structure: &Structure,
-    gamma_per_m2: f64,
-    led: BTreeSet<(Vertex, Vertex)>,
-) -> GivenUp {
-    let doubt = |pair: &(Vertex, Vertex)| particles.iter().any(|p| unnamed(p, *pair));
-    let doubted: Vec<(Vertex, Vertex)> = led.into_iter().filter(doubt).collect();
-    let mut given_up = GivenUp { revisits: 0, disputed: Vec::new() };
-    for pair in doubted {
-        let proposal = Proposal { i: pair.0, kind: EdgeKind::Distance, probability: 0.0 };
-        let fits = measure_again(graph, pair.1, &[proposal]).fits;
-        let again = |p: &Particle| {
-            if unnamed(p, pair) { without(p, structure, pair, &fits, gamma_per_m2) } else { None }
-        };
-        let again: Vec<Option<Particle>> = particles.par_iter().map(again).collect();
-        given_up.revisits += usize::from(again.iter().any(Option::is_some));
-        for (p, again) in particles.iter_mut().zip(again) {
-            let Some(again) = again else { continue };
-            let kept: BTreeSet<_> = again.edges.iter().map(|e| e.factor).collect();
-            given_up.disputed.extend(p.edges.iter().map(|e| e.factor).filter(|f| !kept.contains(f)));
-            *p = again;
-        }
-    }
-    given_up
-}
-
 /// Each waits once, and not too many.
 fn wait(waiting: &mut VecDeque<Vertex>, places: impl Iterator<Item = Vertex>) {
     for v in places {
@@ -119,33 +67,6 @@ fn wait(waiting: &mut VecDeque<Vertex>, places: impl Iterator<Item = Vertex>) {
         }
     }
     waiting.drain(..waiting.len().saturating_sub(WAITING_MAX));
-}
-
-/// Whether the names of a pair would not propose an edge.
-fn unnamed(p: &Particle, (i, j): (Vertex, Vertex)) -> bool {
-    p.labels.similarity(i, j) < SIMILARITY_MIN
-}
-
-/// The particle without the edges of a revisit, if it would not take it by the distance alone.
-fn without(
-    particle: &Particle,
-    structure: &Structure,
-    pair: (Vertex, Vertex),
-    fits: &[Fit],
-    gamma_per_m2: f64,
-) -> Option<Particle> {
-    if particle.edges.iter().all(|e| e.named != Some(pair)) {
-        return None;
-    }
-    let mut without = particle.clone();
-    without.give_up(|e| e.named == Some(pair));
-    without.update(structure).ok()?;
-    let would = |fit: &Fit| {
-        let log_looks = log_looks(fit, fits.len());
-        judge_alone(structure, &without, fit, pair.1, log_looks, gamma_per_m2)
-            .is_some_and(|j| j.posterior > 0.5)
-    };
-    (!fits.iter().any(would)).then_some(without)
 }
 
 /// The places at which an utterance says more of a name than before.
@@ -159,43 +80,7 @@ pub fn gained(before: &[Evidence], after: &[Evidence]) -> Vec<Vertex> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::decide::add_edge;
     use crate::filter::labels::{Labels, Source};
-    use crate::geometry::Pose2;
-    use crate::scan::matching::Mode;
-    use nalgebra::{Matrix3, Vector3};
-
-    /// A chain of 21 places 1 m apart and a fit of its ends at `x_m`, taken because both were called alike.
-    fn tied(x_m: f64) -> (Structure, Particle, Fit) {
-        let (mut structure, mut p) = (Structure::new(), Particle::empty(10));
-        for _ in 0..21 {
-            let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
-            structure.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
-        }
-        structure.arrange();
-        for (utterance, place) in [(0, 0), (1, 20)] {
-            p.labels.add(Evidence::new(utterance, 7, place, 1.0, Source::Direct));
-        }
-        p.update(&structure).unwrap();
-        let covariance = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1.6e-5));
-        let mode = Mode { i_from_j: Pose2::new(x_m, 0.0, 0.0), covariance, score: 0.9, overlap: 0.6 };
-        let mut fit = Fit::supported_by(0, mode, EdgeKind::Semantic, 3);
-        fit.named = Some((0, 20));
-        p.take(add_edge(&mut structure, &fit, 0, 20).unwrap());
-        p.update(&structure).unwrap();
-        (structure, p, fit)
-    }
-
-    #[test]
-    fn a_revisit_that_names_led_to_stays_only_if_it_is_where_the_map_expects_it() {
-        let (structure, p, fit) = tied(20.1);
-        assert!(without(&p, &structure, (0, 20), std::slice::from_ref(&fit), 0.2).is_none());
-        assert!(without(&p, &structure, (0, 19), &[], 0.2).is_none(), "of other names");
-        let (structure, p, fit) = tied(16.0);
-        let again = without(&p, &structure, (0, 20), &[fit], 0.2).unwrap();
-        assert!(again.edges.is_empty() && (again.belief.pose(20).x_m - 20.0).abs() < 1e-6);
-        assert!((p.belief.pose(20).x_m - 16.0).abs() < 0.2);
-    }
 
     #[test]
     fn what_an_edge_carried_goes_with_it() {

@@ -23,7 +23,15 @@ pub struct Content {
     pub sample: Vec<Point>,
 }
 
+/// A place with fewer points to look up shows nothing that could be matched.
+const BARE_MAX: usize = 20;
+
 impl Content {
+    /// Whether there is nothing to match, as where the laser sees nothing.
+    pub fn is_bare(&self) -> bool {
+        self.sample.len() < BARE_MAX
+    }
+
     /// From sweeps with their poses in the place's frame.
     pub fn new(sweeps: &[(Pose2, &Sweep)]) -> Self {
         let all: Vec<Point> = sweeps.iter().flat_map(|(pose, s)| moved(&s.points, pose)).collect();

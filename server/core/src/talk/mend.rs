@@ -40,15 +40,13 @@ pub(crate) fn undo(talk: &mut Talk, filter: &mut Filter, id: Option<&str>) -> Re
 
 /// The same by the sentence's number in the ledger. Returns how many loops were given up with it.
 pub(crate) fn strike(talk: &mut Talk, filter: &mut Filter, number: u32) -> usize {
-    let led = filter.led_by_names();
     Arc::make_mut(&mut talk.ledger).strike(number);
     for p in &mut filter.particles {
         p.revoke(number);
     }
     resolve(talk, filter);
-    let given_up = filter.judge_again(led);
     filter.rank();
-    given_up
+    0
 }
 
 fn rename(talk: &mut Talk, filter: &mut Filter, from: &str, to: &str) -> Result<String, String> {

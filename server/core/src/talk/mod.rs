@@ -61,3 +61,9 @@ impl Talk {
         describe::reground_all(self, filter);
     }
 }
+
+impl crate::filter::words::Words for Talk {
+    fn log_likelihood(&self, particle: &Particle) -> f64 {
+        particle.log_words
+    }
+}

@@ -1,0 +1,128 @@
+//! Step 4 where nothing was found: the detector's other outcome, eqs. (17–18).
+//!
+//! A graph that lays the newest place over an older one expects the two to look alike. Where a pair was looked
+//! at and does not, or looks alike elsewhere only, it weighs by
+//!
+//! ```text
+//! p(no fit | G) / p(no fit | new ground) = 1 − p_D · ō,    ō = P(the two overlap) under x⁻
+//! ```
+//!
+//! and one that expects nothing there by 1. Pairs are the same for all particles; one that nobody looked at
+//! says nothing. Neighbouring places show the same walls: floors are paid for once.
+
+use crate::edge::Vertex;
+use crate::filter::particle::Particle;
+use crate::graph::Graph;
+use crate::smoothing::{Relative, Structure};
+use crate::geometry::Pose2;
+
+/// p_D of a single pair within [`OVERLAP_M`] of each other, by the search.
+const FOUND: f64 = 0.8;
+/// Places this near overlap …
+const OVERLAP_M: f64 = 2.0;
+/// … if either has so many surfaces to show.
+const SURFACES_MIN: usize = 60;
+/// Fits within so much of where they are expected, beyond its spread, are those expected.
+const EXPECTED_M: f64 = 0.5;
+const EXPECTED_RAD: f64 = 0.1;
+/// So many standard deviations of the spread.
+const SIGMAS: f64 = 3.0;
+/// Path that shows the same walls, metres.
+const SAME_WALLS_M: f64 = 5.0;
+
+/// log factor of place `t` for one particle, given what was looked at and what was found; what it pays is
+/// remembered.
+pub fn pay(
+    graph: &Graph,
+    structure: &Structure,
+    particle: &mut Particle,
+    t: Vertex,
+    looked: &[(Vertex, Vec<Pose2>)],
+) -> f64 {
+    let path_m = graph.place(t).path_m;
+    if particle.missed_at_m.is_some_and(|at_m| path_m - at_m < SAME_WALLS_M) {
+        return 0.0;
+    }
+    let log = log_missed(graph, structure, particle, t, looked);
+    if log < -0.1 {
+        particle.missed_at_m = Some(path_m);
+    }
+    log
+}
+
+fn log_missed(
+    graph: &Graph,
+    structure: &Structure,
+    particle: &Particle,
+    t: Vertex,
+    looked: &[(Vertex, Vec<Pose2>)],
+) -> f64 {
+    let shows = |v: Vertex| graph.place(v).content.sample.len() >= SURFACES_MIN;
+    if !shows(t) {
+        return 0.0;
+    }
+    let near = |i: Vertex| particle.belief.pose(i).distance_m(&particle.belief.pose(t)) < 3.0 * OVERLAP_M;
+    let pairs: Vec<Vertex> = looked.iter().map(|(i, _)| *i).filter(|&i| shows(i) && near(i)).collect();
+    let Ok(predicted) = particle.belief.relative(structure, t, &pairs) else { return 0.0 };
+    let mut expected: f64 = 0.0;
+    for r in &predicted {
+        let overlap = p_overlap(r);
+        let found = looked.iter().filter(|(i, _)| *i == r.i).flat_map(|(_, modes)| modes);
+        if overlap > 0.01 && found.into_iter().any(|z| is_expected(r, z)) {
+            return 0.0;
+        }
+        expected = expected.max(overlap);
+    }
+    (1.0 - FOUND * expected).ln()
+}
+
+/// P(o): that the two places lie within [`OVERLAP_M`] of each other along either axis.
+fn p_overlap(r: &Relative) -> f64 {
+    let m = r.i_from_a.inverse();
+    let within = |mean_m: f64, variance: f64| {
+        let root = (2.0 * variance.max(1e-6)).sqrt();
+        0.5 * (erf((OVERLAP_M - mean_m) / root) + erf((OVERLAP_M + mean_m) / root))
+    };
+    within(m.x_m, r.covariance[(0, 0)]) * within(m.y_m, r.covariance[(1, 1)])
+}
+
+fn is_expected(r: &Relative, z: &Pose2) -> bool {
+    let off = r.i_from_a.between(z);
+    off.x_m.hypot(off.y_m) < EXPECTED_M + SIGMAS * r.sigma_m()
+        && off.yaw_rad.abs() < EXPECTED_RAD + SIGMAS * r.sigma_rad()
+}
+
+/// Abramowitz and Stegun 7.1.26, to 1.5e-7.
+fn erf(x: f64) -> f64 {
+    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
+    let poly = ((((1.061_405_429 * t - 1.453_152_027) * t + 1.421_413_741) * t - 0.284_496_736) * t
+        + 0.254_829_592)
+        * t;
+    (1.0 - poly * (-x * x).exp()).copysign(x)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::{Matrix3, Vector3};
+
+    fn at(x_m: f64, sigma_m: f64) -> Relative {
+        let v = sigma_m * sigma_m;
+        let covariance = Matrix3::from_diagonal(&Vector3::new(v, v, 0.01));
+        Relative { i: 0, i_from_a: Pose2::new(x_m, 0.0, 0.0), covariance }
+    }
+
+    #[test]
+    fn overlap_is_sure_where_it_is_known_and_a_share_where_it_is_not() {
+        assert!(p_overlap(&at(0.5, 0.1)) > 0.99 && p_overlap(&at(5.0, 0.1)) < 0.01);
+        // Two sides of 4 m in a spread of 10 m: .159² by the table of the normal.
+        assert!((p_overlap(&at(0.0, 10.0)) - 0.1585_f64.powi(2)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn a_fit_counts_as_found_where_it_is_expected_and_nowhere_else() {
+        assert!(is_expected(&at(1.0, 0.1), &Pose2::new(1.3, 0.1, 0.05)));
+        assert!(!is_expected(&at(1.0, 0.1), &Pose2::new(3.0, 0.0, 0.0)));
+        assert!(!is_expected(&at(1.0, 0.1), &Pose2::new(1.0, 0.0, 3.1)));
+    }
+}

@@ -1,0 +1,127 @@
+//! Steps 1 and 4 of Algorithm 1 for a fit: every particle's answers to its question, each a child with its
+//! exact weight. Where the paper draws, the best are kept: answers are few, and what is not among the best is
+//! told as unresolved ([`crate::filter::ghosts`]).
+
+use crate::edge::{QuestionId, Vertex};
+use crate::filter::particle::{Edge, Particle};
+use crate::filter::question::{Question, Testimony};
+use crate::filter::weigh::Judgement;
+use crate::filter::words::Words;
+use crate::geometry::Pose2;
+use crate::graph::Graph;
+use crate::smoothing::Structure;
+
+/// Two answers that lay a place within so much of one another are one.
+const SAME_M: f64 = 1.0;
+const SAME_RAD: f64 = 0.17;
+/// A loop raises `Σ eᵀ Ω e` by its distance² at most, and none is taken beyond some hundred: where it
+/// rises by more, Gauss-Newton has lost its way.
+const CHI2_RISE_MAX: f64 = 1000.0;
+/// A fit farther than this from where a particle has the place, distance², is none of its answer.
+const OUTLIER: f64 = 30.0;
+
+/// Where a particle stands towards a fit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Stance {
+    /// "There", before or because its map says the same: the weight gains by what is new in the fit. Whether
+    /// the edge goes with its map.
+    There { log_gain: f64, fits: bool },
+    /// "Elsewhere", before or because it is the same look-alike as one before.
+    Elsewhere,
+    /// Not asked yet: both answers, of which "there" weighs by so much more.
+    Open { log_there: f64 },
+}
+
+/// Where a particle stands, from what it thinks of the fit; `stands` tells whether it knows the robot on old
+/// floor already, and `others` are the questions that the path here is about.
+pub fn stance<'a>(
+    graph: &Graph,
+    particle: &Particle,
+    edge: &Edge,
+    testimony: &Testimony,
+    judgement: Option<Judgement>,
+    stands: bool,
+    others: impl Iterator<Item = &'a Question>,
+) -> Stance {
+    let Some(Judgement { log_there, distance2, known }) = judgement else { return Stance::Elsewhere };
+    if particle.refused.contains(&testimony.question) {
+        return Stance::Elsewhere;
+    }
+    if particle.holds(testimony.question) {
+        return Stance::There { log_gain: testimony.gained, fits: distance2 < OUTLIER };
+    }
+    if known {
+        // On floor that it knows to be old, nothing is news but that it is old at all.
+        return Stance::There { log_gain: if stands { 0.0 } else { log_there }, fits: true };
+    }
+    let pose = |v: Vertex| particle.belief.pose(v);
+    let here = pose(edge.i).compose(&edge.i_from_j);
+    let says_same = |q: &Question| {
+        same(&here, &pose(q.i).compose(&q.i_from_j).compose(&graph.chained(q.j, edge.j)))
+    };
+    let mut refused = others.filter(|q| particle.refused.contains(&q.id));
+    if refused.any(says_same) { Stance::Elsewhere } else { Stance::Open { log_there } }
+}
+
+/// Whether two poses are one answer.
+pub fn same(a: &Pose2, b: &Pose2) -> bool {
+    a.distance_m(b) < SAME_M && a.between(b).yaw_rad.abs() < SAME_RAD
+}
+
+/// One answer of one particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Child {
+    /// Which particle's.
+    pub parent: usize,
+    /// "There".
+    pub there: bool,
+    /// Whether it adds the fit's edge.
+    pub adds: bool,
+    /// log w.
+    pub log_weight: f64,
+}
+
+/// All answers of all particles, likeliest first.
+pub fn children(particles: &[Particle], stances: &[Stance]) -> Vec<Child> {
+    let of = |(parent, (p, stance)): (usize, (&Particle, &Stance))| {
+        let child = |there, adds, log: f64| Child { parent, there, adds, log_weight: p.log_weight + log };
+        match *stance {
+            Stance::There { log_gain, fits } => vec![child(true, fits, log_gain)],
+            Stance::Elsewhere => vec![child(false, false, 0.0)],
+            Stance::Open { log_there } => vec![child(false, false, 0.0), child(true, true, log_there)],
+        }
+    };
+    let mut all: Vec<Child> = particles.iter().zip(stances).enumerate().flat_map(of).collect();
+    all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight).then(a.parent.cmp(&b.parent)));
+    all
+}
+
+/// A child as a particle of its own: G, X and w. None where the edge does not go with the poses.
+pub fn born(
+    parent: &Particle,
+    child: &Child,
+    question: QuestionId,
+    edge: Option<&Edge>,
+    structure: &Structure,
+    words: &dyn Words,
+) -> Option<Particle> {
+    let mut p = parent.clone();
+    p.log_weight = child.log_weight;
+    if !child.there {
+        p.refuse(question);
+        return Some(p);
+    }
+    p.take(question);
+    let Some(edge) = edge.filter(|_| child.adds) else { return Some(p) };
+    let before = p.belief.chi2(structure);
+    p.add(edge.clone());
+    p.update(structure).ok()?;
+    if p.belief.chi2(structure) >= before + CHI2_RISE_MAX {
+        return None;
+    }
+    // What was said before counts for the floors that are one by now.
+    let log_words = words.log_likelihood(&p);
+    p.log_weight += log_words - p.log_words;
+    p.log_words = log_words;
+    Some(p)
+}

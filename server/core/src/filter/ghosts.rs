@@ -1,0 +1,140 @@
+//! What was dropped: answers and their odds, without poses.
+//!
+//! The best graphs are kept and no others. Of what is dropped the answer stays that told it from what was kept,
+//! with its odds. They change with all that the kept graphs gain or pay after, and while they last they are
+//! told:
+//!
+//! ```text
+//! unresolved = 1 − Π_q (1 − u_q),    u_q = odds_q / (1 + odds_q)
+//! ```
+//!
+//! An answer of u_q > [`REOPENED`] comes back as a graph; one of less than [`FORGOTTEN`] is forgotten.
+
+use crate::edge::QuestionId;
+use crate::filter::particle::Edge;
+use crate::filter::chance::log_add;
+use serde::{Deserialize, Serialize};
+
+/// Odds from which a dropped answer comes back.
+pub const REOPENED: f64 = 0.02;
+/// Odds below which it is forgotten.
+pub const FORGOTTEN: f64 = 1e-6;
+/// Answers remembered, the likeliest.
+const REMEMBERED_MAX: usize = 64;
+
+/// An answer that no graph gives any more.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ghost {
+    /// An edge of the question.
+    pub edge: Edge,
+    /// Whether the answer dropped was "there".
+    pub there: bool,
+    /// Its odds against what was kept.
+    pub log_odds: f64,
+    /// How much of that the kept graphs gained or lost since, see [`Ghosts::kept_gained`].
+    pub since: f64,
+}
+
+impl Ghost {
+    /// u_q.
+    pub fn share(&self) -> f64 {
+        1.0 / (1.0 + (-self.log_odds).exp())
+    }
+}
+
+/// All answers dropped.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+pub struct Ghosts {
+    ghosts: Vec<Ghost>,
+}
+
+impl Ghosts {
+    /// Remembers an answer that was dropped.
+    pub fn drop_answer(&mut self, ghost: Ghost) {
+        let same = |g: &&mut Ghost| (g.edge.question, g.there) == (ghost.edge.question, ghost.there);
+        match self.ghosts.iter_mut().find(same) {
+            Some(g) => g.log_odds = log_add(g.log_odds, ghost.log_odds),
+            None => self.ghosts.push(ghost),
+        }
+        self.ghosts.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.edge.question.cmp(&b.edge.question)));
+        self.ghosts.truncate(REMEMBERED_MAX);
+    }
+
+    /// A fit of a question was seen that says so much more for "there".
+    pub fn gain(&mut self, question: QuestionId, log_gain: f64) {
+        for g in self.ghosts.iter_mut().filter(|g| g.edge.question == question) {
+            g.log_odds += if g.there { log_gain } else { -log_gain };
+        }
+    }
+
+    /// The kept graphs gained so much, or paid, for where they lay the newest places: graphs that held those
+    /// elsewhere did neither.
+    pub fn kept_gained(&mut self, log_gain: f64) {
+        for g in self.ghosts.iter_mut().filter(|g| !g.there) {
+            g.log_odds -= log_gain;
+            g.since -= log_gain;
+        }
+    }
+
+    /// Takes out the likeliest answer that is to come back.
+    pub fn next_reopened(&mut self) -> Option<Ghost> {
+        let at = self.ghosts.iter().position(|g| g.share() > REOPENED)?;
+        Some(self.ghosts.remove(at))
+    }
+
+    /// All that are still remembered, whose odds may be told anew.
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Ghost> {
+        self.ghosts.iter_mut()
+    }
+
+    /// Forgets what became impossible.
+    pub fn forget(&mut self) {
+        self.ghosts.retain(|g| g.share() > FORGOTTEN);
+    }
+
+    /// Posterior mass of all that was dropped.
+    pub fn unresolved(&self) -> f64 {
+        1.0 - self.ghosts.iter().map(|g| 1.0 - g.share()).product::<f64>()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::weigh::tests::{edge, fit};
+
+    fn ghost(n: u32, there: bool, share: f64) -> Ghost {
+        let edge = Edge { question: QuestionId { boot: 0, n }, ..edge(&fit(1.0, 0.9, 3)) };
+        Ghost { edge, there, log_odds: (share / (1.0 - share)).ln(), since: 0.0 }
+    }
+
+    #[test]
+    fn what_is_dropped_adds_up_and_may_fall_again() {
+        let mut ghosts = Ghosts::default();
+        ghosts.drop_answer(ghost(0, false, 0.001));
+        ghosts.drop_answer(ghost(1, true, 0.002));
+        assert!((ghosts.unresolved() - (1.0 - 0.999 * 0.998)).abs() < 1e-12);
+        ghosts.gain(QuestionId { boot: 0, n: 0 }, 20.0);
+        ghosts.forget();
+        assert!((ghosts.unresolved() - 0.002).abs() < 1e-9);
+    }
+
+    #[test]
+    fn what_becomes_likely_comes_back() {
+        let mut ghosts = Ghosts::default();
+        ghosts.drop_answer(ghost(0, false, 0.001));
+        assert_eq!(ghosts.next_reopened(), None);
+        // The kept graphs expected a fit in vain, twice.
+        ghosts.kept_gained(-3.2);
+        assert_eq!(ghosts.next_reopened().map(|g| g.edge.question.n), Some(0));
+        assert!(ghosts.unresolved() < 1e-12);
+    }
+
+    #[test]
+    fn few_are_remembered_the_likeliest() {
+        let mut ghosts = Ghosts::default();
+        (0..100).for_each(|n| ghosts.drop_answer(ghost(n, false, 1e-5 * f64::from(n + 1))));
+        assert_eq!(ghosts.ghosts.len(), REMEMBERED_MAX);
+        assert_eq!(ghosts.ghosts[0].edge.question.n, 99);
+    }
+}

@@ -1,0 +1,76 @@
+//! What was dropped comes back where it became likely: an answer given up or given after all, with the weight
+//! that its graph has by now.
+
+use crate::effects::{Effect, Effects};
+use crate::filter::Filter;
+use crate::filter::ghosts::Ghost;
+use crate::filter::particle::Particle;
+use crate::filter::weigh::judge;
+use crate::filter::words::Words;
+use std::sync::Arc;
+
+/// Answers that come back per place: each is a graph solved anew.
+const REOPENED_MAX: usize = 2;
+
+impl Filter {
+    /// Brings back what became likely.
+    pub(super) fn reopen(&mut self, words: &dyn Words) -> Effects {
+        self.tell_anew();
+        let mut effects = Effects::new();
+        for _ in 0..REOPENED_MAX {
+            let Some(ghost) = self.ghosts.next_reopened() else { break };
+            let (i, j, kind) = (ghost.edge.i, ghost.edge.j, ghost.edge.kind);
+            let Some(child) = self.come_back(&ghost, words) else { continue };
+            let what = if ghost.there { "may be there after all" } else { "may not be there after all" };
+            let reason = format!("edge {j}–{i}: {what}, log odds {:.1}", child.log_weight - self.best().log_weight);
+            self.particles.push(child);
+            self.rank();
+            effects.push(Effect::EdgeRefused { i: i.into(), j: j.into(), kind, reason });
+        }
+        effects
+    }
+
+    /// The odds of answers that the best map refuses, as it is by now.
+    fn tell_anew(&mut self) {
+        let Self { graph, structure, particles, ghosts, .. } = self;
+        let best = &particles[0];
+        for ghost in ghosts.iter_mut().filter(|g| g.there && !best.holds(g.edge.question)) {
+            if let Some(judged) = judge(graph, structure, best, &ghost.edge) {
+                ghost.log_odds = judged.log_there;
+            }
+        }
+    }
+
+    /// The best particle with the other answer. None if no graph comes of it, or the same.
+    fn come_back(&mut self, ghost: &Ghost, words: &dyn Words) -> Option<Particle> {
+        let question = ghost.edge.question;
+        let mut p = self.best().clone();
+        if p.holds(question) == ghost.there {
+            return None;
+        }
+        if ghost.there {
+            let judged = judge(&self.graph, &self.structure, &p, &ghost.edge)?;
+            let edge = ghost.edge.clone().enter(Arc::make_mut(&mut self.structure))?;
+            self.disputed.push(edge.factor);
+            self.update();
+            p = self.best().clone();
+            p.refused.retain(|&q| q != question);
+            p.add(edge);
+            p.update(&self.structure).ok()?;
+            p.log_weight += judged.log_there;
+        } else {
+            self.disputed.extend(p.edges.iter().filter(|e| e.question == question).map(|e| e.factor));
+            p.give_up(question);
+            p.update(&self.structure).ok()?;
+            let judged = judge(&self.graph, &self.structure, &p, &ghost.edge)?;
+            if judged.known {
+                return None;
+            }
+            p.log_weight += ghost.since - judged.log_there;
+        }
+        let log_words = words.log_likelihood(&p);
+        p.log_weight += log_words - p.log_words;
+        p.log_words = log_words;
+        Some(p)
+    }
+}
