@@ -4,11 +4,12 @@
 use crate::geometry::Pose2;
 use crate::smoothing::chunked::Chunked;
 use crate::smoothing::factor::{At, residual};
+use crate::smoothing::frames::Frames;
 use crate::smoothing::front::Front;
 use crate::smoothing::marginal::Prior;
-use crate::smoothing::structure::Structure;
+use crate::smoothing::structure::{Holders, Structure};
 use crate::smoothing::tree::{Clique, Entry, NONE, Places, Share};
-use crate::smoothing::{FactorId, SmoothError};
+use crate::smoothing::{Factor, FactorId, SmoothError};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -24,7 +25,9 @@ pub(super) struct Step {
 /// One particle's numbers. A clone shares everything with its original until one of them changes.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Belief {
-    /// Linearisation points.
+    /// Where the frames of linearisation points are.
+    frames: Frames,
+    /// Linearisation points, each in its frame.
     pub(super) points: Chunked<At>,
     pub(super) steps: Chunked<Step>,
     /// Factors held, a bit each.
@@ -65,21 +68,61 @@ impl Belief {
         self.set_held(id, true);
     }
 
+    /// Goes on to hold a factor that [`Structure::loosen`] has just made one that not all hold. Any other
+    /// time it takes [`Belief::hold`].
+    pub fn hold_as_before(&mut self, id: FactorId) {
+        self.mark_held(id, true);
+    }
+
+    /// Moves all poses from one on as a whole: what was at p is at `moved ∘ p` (origin's frame: metres,
+    /// radians). From there the next update goes on, which has to solve anew only what the factors
+    /// between the moved and the others reach. For a start near an optimum that is far: no step is
+    /// too long for it, no turn too wide. What is held does not change.
+    ///
+    /// Errors: the first pose, which is the origin; a pose that it has not been updated with;
+    /// numbers that are not finite. Nothing moves then.
+    pub fn rebase(&mut self, structure: &Structure, from: u32, moved: &Pose2) -> Result<(), SmoothError> {
+        if from == 0 {
+            return Err(SmoothError::Needed(0));
+        }
+        if from as usize >= self.len() {
+            return Err(SmoothError::NoSuchPose { pose: from, len: self.len() });
+        }
+        if !moved.is_finite() {
+            return Err(SmoothError::NotFinite);
+        }
+        self.frames.rebase(from, moved);
+        let of_moved = structure.of_pose.iter().take(self.len()).skip(from as usize).flatten();
+        let crosses = |id: &&FactorId| {
+            self.has(structure, **id) && structure.entries[**id as usize].poses().any(|p| p < from)
+        };
+        let crossing: Vec<FactorId> = of_moved.filter(crosses).copied().collect();
+        self.changed.extend(crossing);
+        Ok(())
+    }
+
     /// Lets a factor go from the next update on.
     pub fn release(&mut self, id: FactorId) {
         self.set_held(id, false);
     }
 
     fn set_held(&mut self, id: FactorId, held: bool) {
+        if self.mark_held(id, held) {
+            self.changed.push(id);
+        }
+    }
+
+    /// Returns whether that is new.
+    fn mark_held(&mut self, id: FactorId, held: bool) -> bool {
         if self.holds(id) == held {
-            return;
+            return false;
         }
         let (word, bit) = (id as usize / 64, id % 64);
         while self.held.len() <= word {
             self.held.push(0);
         }
         *self.held.make_mut(word) ^= 1 << bit;
-        self.changed.push(id);
+        true
     }
 
     /// Whether it holds a factor.
@@ -100,12 +143,13 @@ impl Belief {
 
     /// Pose i: origin_from_i; of a marginalised one, as it was last. Indexes like a slice.
     pub fn pose(&self, i: u32) -> Pose2 {
-        self.points[i as usize].moved(&self.steps[i as usize].by)
+        self.frames.outward(i, self.points[i as usize].moved(&self.steps[i as usize].by))
     }
 
     /// All poses.
     pub fn poses(&self) -> Vec<Pose2> {
-        self.points.iter().zip(self.steps.iter()).map(|(point, step)| point.moved(&step.by)).collect()
+        let moved = self.points.iter().zip(self.steps.iter()).map(|(point, step)| point.moved(&step.by));
+        (0..).zip(moved).map(|(i, pose)| self.frames.outward(i, pose)).collect()
     }
 
     /// Number of poses.
@@ -130,7 +174,11 @@ impl Belief {
     }
 
     pub(super) fn has(&self, structure: &Structure, id: FactorId) -> bool {
-        structure.common[id as usize] || self.holds(id)
+        match structure.holders[id as usize] {
+            Holders::All => true,
+            Holders::Some => self.holds(id),
+            Holders::Others(tight) => !self.holds(tight),
+        }
     }
 
     /// New poses begin where the factor says that they were added with.
@@ -143,7 +191,7 @@ impl Belief {
                 Some(Entry::Between(f, _)) if k > 0 => self.pose(f.j).compose(&f.i_from_j.inverse()),
                 _ => Pose2::default(),
             };
-            self.points.push(At::new(pose));
+            self.points.push(At::new(self.frames.inward(k as u32, pose)));
             self.steps.push(Step::default());
         }
     }
@@ -197,8 +245,8 @@ impl Belief {
     fn add_factor(&self, structure: &Structure, share: &Share, front: &mut Front) {
         match (&structure.entries[share.id as usize], &share.at) {
             (Entry::Between(f, z), &Places::Two(i, j)) if self.has(structure, share.id) => {
-                let at = |p: u32| &self.points[p as usize];
-                let part = residual(z, at(f.i), at(f.j)).weighted(&f.information);
+                let [at_i, at_j] = self.points_of(f);
+                let part = residual(z, &at_i, &at_j).weighted(&f.information);
                 if i != NONE {
                     front.add(i as usize, i as usize, &part.h_ii);
                     front.add_rhs(i as usize, &part.b_i);
@@ -213,10 +261,26 @@ impl Belief {
             }
             (Entry::Prior(poses), Places::Many(places)) => {
                 if let Some(prior) = self.prior(share.id) {
-                    prior.add_to(front, poses, places, |p| self.points[p as usize]);
+                    prior.add_to(front, poses, places, self.points_among(poses));
                 }
             }
             _ => {}
+        }
+    }
+
+    /// Linearisation points of a factor's two poses, as seen from somewhere.
+    pub(super) fn points_of(&self, f: &Factor) -> [At; 2] {
+        let poses = [f.i, f.j];
+        poses.map(self.points_among(&poses))
+    }
+
+    /// Linearisation points of some poses, as seen from somewhere: from within their frame if they share it,
+    /// since there they are what they were, to the bit, before it moved.
+    pub(super) fn points_among(&self, poses: &[u32]) -> impl Fn(u32) -> At {
+        let within = self.frames.one_has(poses);
+        move |p| {
+            let point = self.points[p as usize];
+            if within { point } else { At::new(self.frames.outward(p, point.pose)) }
         }
     }
 

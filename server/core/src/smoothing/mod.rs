@@ -22,7 +22,7 @@
 //! | G | poses and factors of all particles together | [`structure`] |
 //! | cliques | who is eliminated with whom, given whom | [`tree`], in the [`order`] of least fill |
 //! | L, η | a clique's share of them, for one particle | [`front`]; by QR where digits are few: [`qr`] |
-//! | x̄, δ | linearisation points and steps of one particle | [`belief`], brought up to date in [`update`] |
+//! | x̄, δ | linearisation points and steps of one particle | [`belief`], in [`frames`]; brought up to date in [`update`] |
 //! | Σ_jj, Σ_tj | covariances | [`covariance`]; of all poses by the selected [`inverse`] |
 //! | p(X \ x_v) | what a marginalised pose leaves | [`marginal`] |
 //!
@@ -39,6 +39,7 @@ mod belief;
 mod chunked;
 mod covariance;
 mod factor;
+mod frames;
 mod front;
 mod inverse;
 mod kernels;
@@ -76,7 +77,7 @@ pub enum SmoothError {
     /// The pose is no longer there.
     #[error("pose {0} was marginalised")]
     Marginalised(u32),
-    /// The pose cannot be marginalised.
+    /// The pose cannot be marginalised, nor, if it is the first, loosened or moved.
     #[error("pose {0} is still needed: it is the first, the newest, or not arranged yet")]
     Needed(u32),
     /// A factor from a pose to itself.

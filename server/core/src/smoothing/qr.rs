@@ -56,10 +56,10 @@ fn factor_rows(
     clique: &Clique,
 ) -> Result<Option<Mat<f64>>, SmoothError> {
     let n = 3 * clique.poses.len();
-    let at = |p: u32| belief.points[p as usize];
     match (&structure.entries[share.id as usize], &share.at) {
         (Entry::Between(f, z), &Places::Two(i, j)) if belief.has(structure, share.id) => {
-            let r = residual(z, &at(f.i), &at(f.j));
+            let [at_i, at_j] = belief.points_of(f);
+            let r = residual(z, &at_i, &at_j);
             let root = f.information.cholesky().ok_or(SmoothError::Singular)?.l().transpose();
             let mut rows = Mat::zeros(3, n + 1);
             for (place, jacobian) in [(i, root * r.j_i), (j, root * r.j_j)] {
@@ -76,7 +76,7 @@ fn factor_rows(
         (Entry::Prior(poses), Places::Many(places)) => {
             let Some(prior) = belief.prior(share.id) else { return Ok(None) };
             let mut alone = Front::new(clique.poses.len(), 0);
-            prior.add_to(&mut alone, poses, places, at);
+            prior.add_to(&mut alone, poses, places, belief.points_among(poses));
             root(alone.left().as_ref()).map(Some)
         }
         _ => Ok(None),

@@ -69,6 +69,31 @@ impl Smoother {
         Ok(())
     }
 
+    /// See [`Structure::loosen`]; the factor stays held.
+    pub fn loosen(&mut self, pose: u32, wide: &Matrix3<f64>) -> Result<FactorId, SmoothError> {
+        let known = self.structure.loosened(pose).is_some();
+        let id = Arc::make_mut(&mut self.structure).loosen(pose, wide)?;
+        if !known {
+            self.belief.hold_as_before(id);
+        }
+        Ok(id)
+    }
+
+    /// See [`Belief::hold`].
+    pub fn hold(&mut self, id: FactorId) {
+        self.belief.hold(id);
+    }
+
+    /// See [`Belief::release`].
+    pub fn release(&mut self, id: FactorId) {
+        self.belief.release(id);
+    }
+
+    /// See [`Belief::rebase`].
+    pub fn rebase(&mut self, from: u32, moved: &Pose2) -> Result<(), SmoothError> {
+        self.belief.rebase(&self.structure, from, moved)
+    }
+
     /// A present factor, added by [`Smoother::add_factor`].
     pub fn factor(&self, id: FactorId) -> Option<&Factor> {
         self.structure.factor(id)

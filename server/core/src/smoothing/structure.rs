@@ -17,8 +17,8 @@ pub struct Structure {
     pub(super) entries: Vec<Entry>,
     /// Factor that each pose starts from; of the first, no matter which.
     pub(super) starts: Vec<FactorId>,
-    /// Whether a factor is one that a pose started from: all particles hold it.
-    pub(super) common: Vec<bool>,
+    /// Who holds a factor.
+    pub(super) holders: Vec<Holders>,
     /// Factors of each pose.
     pub(super) of_pose: Vec<Vec<FactorId>>,
     /// How much the factors of each pose mind that it turns.
@@ -37,6 +37,17 @@ pub struct Structure {
     new_factors: Vec<FactorId>,
     touched: Vec<u32>,
     gone: Vec<u32>,
+}
+
+/// Which particles hold a factor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) enum Holders {
+    /// All: it is what a pose started from, or what a marginalised one left.
+    All,
+    /// Those told so.
+    Some,
+    /// Those that do not hold this one, which was loosened.
+    Others(FactorId),
 }
 
 /// The largest of a pose's factors, in standard deviations of their translations.
@@ -112,7 +123,7 @@ impl Structure {
         self.check_present(&factor, new)?;
         factor.information = checked_information(&factor.information)?;
         self.push_pose(self.entries.len() as FactorId);
-        self.push_factor(factor, true);
+        self.push_factor(factor, Holders::All);
         Ok(new)
     }
 
@@ -133,12 +144,68 @@ impl Structure {
         self.check_present(&factor, u32::MAX)?;
         factor.information = checked_information(&factor.information)?;
         u32::try_from(self.entries.len()).map_err(|_| SmoothError::TooLarge)?;
-        Ok(self.push_factor(factor, false))
+        Ok(self.push_factor(factor, Holders::Some))
     }
 
-    /// Takes a factor out for good. No particle may hold it any more.
+    /// Makes the factor that a pose started from one that a particle holds only if told so, and returns it.
+    ///
+    /// A particle that releases it holds another instead: of the same z, and of the information `wide`
+    /// (1/m², 1/rad², frame of the factor's j), so that the pose stays tied to the others. A particle
+    /// holds one of the two, never both: those that hold the tight one know what they knew before. All
+    /// must be told so at once by [`super::Belief::hold_as_before`], which spoils no numbers, nor does
+    /// this: no clique changes its shape. Loosened again ([`Structure::loosened`]) the factor is the same,
+    /// `wide` is ignored, and nobody is to be told.
+    ///
+    /// Errors: no such pose, the first one, a marginalised one or one whose factor went with a
+    /// marginalised neighbour ([`SmoothError::NoSuchFactor`]); `wide` no information matrix.
+    pub fn loosen(&mut self, pose: u32, wide: &Matrix3<f64>) -> Result<FactorId, SmoothError> {
+        self.check_pose(pose)?;
+        let tight = self.starts[pose as usize];
+        let information = checked_information(wide)?;
+        let factor = match self.entries.get(tight as usize) {
+            _ if pose == 0 => return Err(SmoothError::Needed(0)),
+            Some(Entry::Between(factor, _)) => Factor { information, ..factor.clone() },
+            _ => return Err(SmoothError::NoSuchFactor(tight)),
+        };
+        if self.loosened(pose).is_some() {
+            return Ok(tight);
+        }
+        let id = u32::try_from(self.entries.len()).map_err(|_| SmoothError::TooLarge)?;
+        self.holders[tight as usize] = Holders::Some;
+        if self.tree.clique_of_factor[tight as usize] == super::tree::NONE {
+            self.push_factor(factor, Holders::Others(tight));
+            return Ok(tight);
+        }
+        // The poses are those of the tight one, and so is the clique.
+        for p in [factor.i, factor.j] {
+            self.stiffness[p as usize].take_up(&factor);
+            self.of_pose[p as usize].push(id);
+        }
+        let z = At::new(factor.i_from_j);
+        self.entries.push(Entry::Between(factor, z));
+        self.holders.push(Holders::Others(tight));
+        self.tree.stand_in(tight);
+        Ok(tight)
+    }
+
+    /// What a pose started from, if that was loosened and is there.
+    pub fn loosened(&self, pose: u32) -> Option<FactorId> {
+        let id = *self.starts.get(pose as usize).filter(|_| pose > 0)?;
+        self.factor(id).map(|_| id)
+    }
+
+    /// Takes a factor out for good. No particle may hold it any more. Of one that was loosened, all hold
+    /// the other from now on.
     pub fn remove_factor(&mut self, id: FactorId) -> Result<(), SmoothError> {
-        self.factor(id).ok_or(SmoothError::NoSuchFactor(id))?;
+        let factor = self.factor(id).ok_or(SmoothError::NoSuchFactor(id))?;
+        let newer = factor.i.max(factor.j) as usize;
+        if self.starts[newer] == id {
+            let instead = |&&other: &&FactorId| self.holders[other as usize] == Holders::Others(id);
+            if let Some(&other) = self.of_pose[newer].iter().find(instead) {
+                self.holders[other as usize] = Holders::All;
+                self.starts[newer] = other;
+            }
+        }
         self.remove(id);
         Ok(())
     }
@@ -146,7 +213,7 @@ impl Structure {
     /// A present factor among those that particles hold or not.
     pub fn factor(&self, id: FactorId) -> Option<&Factor> {
         match self.entries.get(id as usize)? {
-            Entry::Between(factor, _) if !self.common[id as usize] => Some(factor),
+            Entry::Between(factor, _) if self.holders[id as usize] == Holders::Some => Some(factor),
             _ => None,
         }
     }
@@ -188,7 +255,7 @@ impl Structure {
         }
         self.gone.push(pose);
         let prior = (neighbours.len() > 1)
-            .then(|| (self.push_entry(Entry::Prior(neighbours.clone()), true), neighbours));
+            .then(|| (self.push_entry(Entry::Prior(neighbours.clone()), Holders::All), neighbours));
         self.marginalised.push(Marginalised { pose, factors, prior });
     }
 
@@ -234,22 +301,22 @@ impl Structure {
         }
     }
 
-    fn push_factor(&mut self, factor: Factor, common: bool) -> FactorId {
+    fn push_factor(&mut self, factor: Factor, holders: Holders) -> FactorId {
         let z = At::new(factor.i_from_j);
         for p in [factor.i, factor.j] {
             self.stiffness[p as usize].take_up(&factor);
         }
-        self.push_entry(Entry::Between(factor, z), common)
+        self.push_entry(Entry::Between(factor, z), holders)
     }
 
-    fn push_entry(&mut self, entry: Entry, common: bool) -> FactorId {
+    fn push_entry(&mut self, entry: Entry, holders: Holders) -> FactorId {
         let id = self.entries.len() as FactorId;
         for p in entry.poses() {
             self.of_pose[p as usize].push(id);
             self.touched.push(p);
         }
         self.entries.push(entry);
-        self.common.push(common);
+        self.holders.push(holders);
         self.tree.clique_of_factor.push(super::tree::NONE);
         self.new_factors.push(id);
         id

@@ -183,6 +183,18 @@ impl Tree {
         self.work = work;
     }
 
+    /// Places a factor, the newest, beside one of the same poses, in a clique that keeps its shape.
+    pub fn stand_in(&mut self, beside: FactorId) {
+        let id = self.clique_of_factor.len() as FactorId;
+        let number = self.clique_of_factor[beside as usize];
+        self.clique_of_factor.push(number);
+        let Some(clique) = self.cliques.get_mut(number as usize) else { return };
+        if let Some(share) = clique.factors.iter().find(|share| share.id == beside) {
+            let at = share.at.clone();
+            clique.factors.push(Share { id, at });
+        }
+    }
+
     /// Takes off the cliques above the touched poses; returns them, emptied of their content.
     fn cut(&mut self, touched: &[u32], work: &mut Work) -> Vec<u32> {
         work.poses.clear();

@@ -130,13 +130,13 @@ impl Graph {
         self.next
     }
 
-    /// Adds a pose where a factor puts it.
-    pub fn start(&mut self, f: Factor) {
+    /// Adds a pose where a factor puts it; returns the factor's term.
+    pub fn start(&mut self, f: Factor) -> u32 {
         match self.poses.get(&f.i).copied() {
             Some(i) if !self.poses.contains_key(&f.j) => self.poses.insert(f.j, i.compose(&f.i_from_j)),
             _ => self.poses.insert(f.i, self.poses[&f.j].compose(&f.i_from_j.inverse())),
         };
-        self.insert(Term::Between(f));
+        self.insert(Term::Between(f))
     }
 
     /// Information matrix and half the negative gradient over some poses at `at`; others are fixed.

@@ -6,11 +6,11 @@ use crate::smoothing::{Belief, Factor, JointRoom, SmoothError, Smoother, Structu
 use nalgebra::{Matrix3, Vector3};
 use serde::{Serialize, de::DeserializeOwned};
 
-fn bytes<T: Serialize>(value: &T) -> Vec<u8> {
+pub fn bytes<T: Serialize>(value: &T) -> Vec<u8> {
     bincode::serde::encode_to_vec(value, bincode::config::standard().with_fixed_int_encoding()).unwrap()
 }
 
-fn loaded<T: DeserializeOwned>(saved: &[u8]) -> T {
+pub fn loaded<T: DeserializeOwned>(saved: &[u8]) -> T {
     let config = bincode::config::standard().with_fixed_int_encoding();
     bincode::serde::decode_from_slice(saved, config).unwrap().0
 }

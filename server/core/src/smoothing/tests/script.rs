@@ -8,6 +8,7 @@ use proptest::prelude::*;
 use proptest::sample::Index;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::collections::BTreeMap;
 
 /// One change of a graph.
 #[derive(Clone, Debug)]
@@ -54,6 +55,8 @@ pub struct Script {
     pub graph: Graph,
     /// Factors of the smoother with their terms in the graph.
     pub loops: Vec<(FactorId, u32)>,
+    /// Terms that poses started with.
+    pub starts: BTreeMap<u32, u32>,
 }
 
 impl Script {
@@ -64,7 +67,7 @@ impl Script {
         let mut graph = Graph::default();
         graph.poses.insert(0, Pose2::default());
         let rng = ChaCha8Rng::seed_from_u64(seed);
-        Self { rng, truth: vec![Pose2::default()], smoother, graph, loops: vec![] }
+        Self { rng, truth: vec![Pose2::default()], smoother, graph, loops: vec![], starts: BTreeMap::new() }
     }
 
     pub fn newest(&self) -> u32 {
@@ -87,13 +90,17 @@ impl Script {
         Factor { i, j, i_from_j: moved(&truth, &e), information: (full + full.transpose()) * 0.5 }
     }
 
+    fn start(&mut self, f: Factor) {
+        self.starts.insert(f.i.max(f.j), self.graph.start(f));
+    }
+
     /// Goes on from the newest pose.
     pub fn extend(&mut self, step: Pose2, sigma: Sigma) {
         let j = self.truth.len() as u32;
         self.truth.push(self.truth[j as usize - 1].compose(&step));
         let f = self.measured(j - 1, j, sigma);
         assert_eq!(self.smoother.add_pose(f.i_from_j, &f.information), Ok(j));
-        self.graph.start(f);
+        self.start(f);
     }
 
     /// A step ahead with a turn.
@@ -110,7 +117,7 @@ impl Script {
         let (i, j) = if inverse { (new, from) } else { (from, new) };
         let f = self.measured(i, j, GOOD);
         assert_eq!(self.smoother.add_pose_from(f.clone()), Ok(new));
-        self.graph.start(f);
+        self.start(f);
     }
 
     /// Starts a session of which little is known.
@@ -120,7 +127,7 @@ impl Script {
         self.truth.push(Pose2::new(x, y, self.rng.random_range(-3.0..3.0)));
         let f = self.measured(0, j, sigma);
         assert_eq!(self.smoother.add_anchor(f.i_from_j, &f.information), Ok(j));
-        self.graph.start(f);
+        self.start(f);
     }
 
     pub fn close(&mut self, i: u32, j: u32, sigma: Sigma) -> FactorId {
