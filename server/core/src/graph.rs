@@ -97,4 +97,10 @@ impl Graph {
         let (a, b) = (self.place(a), self.place(b));
         a.segment != b.segment || (a.path_m - b.path_m).abs() > path_m
     }
+
+    /// Makes the front end doubt the edge to a place.
+    #[cfg(test)]
+    pub(crate) fn doubt(&mut self, v: Vertex, failed: f64) {
+        Arc::make_mut(&mut self.places[v as usize]).chain.failed = failed;
+    }
 }

@@ -3,6 +3,7 @@
 //! told as unresolved ([`crate::filter::ghosts`]).
 
 use crate::edge::{QuestionId, Vertex};
+use crate::filter::failure::LetGo;
 use crate::filter::particle::{Edge, Particle};
 use crate::filter::question::{Question, Testimony};
 use crate::filter::weigh::Judgement;
@@ -25,11 +26,21 @@ const OUTLIER: f64 = 30.0;
 pub enum Stance {
     /// "There", before or because its map says the same: the weight gains by what is new in the fit. Whether
     /// the edge goes with its map.
-    There { log_gain: f64, fits: bool },
+    There {
+        /// By so much.
+        log_gain: f64,
+        /// Whether it adds the edge.
+        fits: bool,
+    },
     /// "Elsewhere", before or because it is the same look-alike as one before.
     Elsewhere,
     /// Not asked yet: both answers, of which "there" weighs by so much more.
-    Open { log_there: f64 },
+    Open {
+        /// By so much.
+        log_there: f64,
+        /// What is let go for it.
+        lets_go: Option<LetGo>,
+    },
 }
 
 /// Where a particle stands, from what it thinks of the fit; `stands` tells whether it knows the robot on old
@@ -43,7 +54,7 @@ pub fn stance<'a>(
     stands: bool,
     others: impl Iterator<Item = &'a Question>,
 ) -> Stance {
-    let Some(Judgement { log_there, distance2, known }) = judgement else { return Stance::Elsewhere };
+    let Some(Judgement { log_there, distance2, known, lets_go }) = judgement else { return Stance::Elsewhere };
     if particle.refused.contains(&testimony.question) {
         return Stance::Elsewhere;
     }
@@ -60,7 +71,7 @@ pub fn stance<'a>(
         same(&here, &pose(q.i).compose(&q.i_from_j).compose(&graph.chained(q.j, edge.j)))
     };
     let mut refused = others.filter(|q| particle.refused.contains(&q.id));
-    if refused.any(says_same) { Stance::Elsewhere } else { Stance::Open { log_there } }
+    if refused.any(says_same) { Stance::Elsewhere } else { Stance::Open { log_there, lets_go } }
 }
 
 /// Whether two poses are one answer.
@@ -77,6 +88,8 @@ pub struct Child {
     pub there: bool,
     /// Whether it adds the fit's edge.
     pub adds: bool,
+    /// What it lets go of the chain.
+    pub lets_go: Option<LetGo>,
     /// log w.
     pub log_weight: f64,
 }
@@ -84,11 +97,15 @@ pub struct Child {
 /// All answers of all particles, likeliest first.
 pub fn children(particles: &[Particle], stances: &[Stance]) -> Vec<Child> {
     let of = |(parent, (p, stance)): (usize, (&Particle, &Stance))| {
-        let child = |there, adds, log: f64| Child { parent, there, adds, log_weight: p.log_weight + log };
+        let child = |there, adds, log: f64| {
+            Child { parent, there, adds, lets_go: None, log_weight: p.log_weight + log }
+        };
         match *stance {
             Stance::There { log_gain, fits } => vec![child(true, fits, log_gain)],
             Stance::Elsewhere => vec![child(false, false, 0.0)],
-            Stance::Open { log_there } => vec![child(false, false, 0.0), child(true, true, log_there)],
+            Stance::Open { log_there, lets_go } => {
+                vec![child(false, false, 0.0), Child { lets_go, ..child(true, true, log_there) }]
+            }
         }
     };
     let mut all: Vec<Child> = particles.iter().zip(stances).enumerate().flat_map(of).collect();
@@ -115,6 +132,9 @@ pub fn born(
     let Some(edge) = edge.filter(|_| child.adds) else { return Some(p) };
     let before = p.belief.chi2(structure);
     p.add(edge.clone());
+    if let Some(let_go) = child.lets_go {
+        p.let_go(structure, &let_go).ok()?;
+    }
     p.update(structure).ok()?;
     if p.belief.chi2(structure) >= before + CHI2_RISE_MAX {
         return None;

@@ -6,6 +6,7 @@
 pub mod absence;
 pub mod answer;
 pub mod chance;
+pub mod failure;
 pub mod ghosts;
 pub mod labels;
 pub mod loops;
@@ -46,6 +47,9 @@ use std::sync::Arc;
 /// Edges of a place that tell no particle anything new: they are measurements still, but who comes for the
 /// tenth time needs no nine of them.
 const KNOWN_MAX: usize = 2;
+
+/// What ties the two ends of a stretch that failed, standard deviations: m, m, rad.
+const LOOSE: [f64; 3] = [20.0, 20.0, 3.0];
 
 /// The posterior over semantic graphs, and what all particles share.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -296,6 +300,7 @@ impl Filter {
             None
         };
         self.disputed.extend(entered.iter().map(|e| e.factor));
+        all.iter().filter_map(|c| c.lets_go).for_each(|l| self.loosen(l.from));
         let (structure, parents, question) = (&self.structure, &self.particles, edge.question);
         let birth = |c: &Child| {
             let edge = entered.as_ref().filter(|_| adds(c));
@@ -307,6 +312,20 @@ impl Filter {
         self.rank();
         self.update(); // X of those who answer "elsewhere"
         self.particles.iter().filter(there).map(Particle::weight).sum()
+    }
+
+    /// Makes a stretch of the chain one that particles may let go.
+    fn loosen(&mut self, from: Vertex) {
+        let structure = Arc::make_mut(&mut self.structure);
+        // Where odometry broke it says next to nothing already.
+        if self.graph.place(from).chain.broken || structure.loosened(from).is_some() {
+            return;
+        }
+        if let Ok(tight) = structure.loosen(from, &Matrix3::from_diagonal(&LOOSE.map(|sigma| sigma.powi(-2)).into())) {
+            structure.arrange();
+            self.particles.iter_mut().for_each(|p| p.belief.hold_as_before(tight));
+            self.disputed.push(tight);
+        }
     }
 
     /// Who expected place t to look like one that was looked at, and nothing was found, pays.

@@ -1,6 +1,7 @@
 //! A particle: {G, X, L, w} of eq. (4). No two are equal.
 
 use crate::edge::{EdgeKind, QuestionId, Vertex};
+use crate::filter::failure::LetGo;
 use crate::filter::labels::Labels;
 use crate::filter::loops::Fit;
 use crate::geometry::Pose2;
@@ -79,6 +80,8 @@ pub struct Particle {
     pub labels: Labels,
     /// What people said, as a share of log w, see [`crate::filter::words`].
     pub log_words: f64,
+    /// Places whose edge from the one before failed.
+    pub failed: Arc<Vec<Vertex>>,
     /// log w; normalised after each step.
     pub log_weight: f64,
     /// Path at which it last paid for a fit that it expected and nobody found, metres.
@@ -96,6 +99,7 @@ impl Particle {
             labels: Labels::default(),
             log_words: 0.0,
             log_weight: 0.0,
+            failed: Arc::default(),
             missed_at_m: None,
         }
     }
@@ -141,6 +145,16 @@ impl Particle {
         Arc::make_mut(&mut self.taken).retain(|&q| q != question);
         self.edges = Arc::new(kept);
         self.refuse(question);
+    }
+
+    /// Lets a stretch of the chain go that [`Structure::loosen`] has loosened, or that ties nothing, and begins
+    /// where its answer has the rest. X follows at the next update.
+    pub fn let_go(&mut self, structure: &Structure, let_go: &LetGo) -> Result<(), SmoothError> {
+        if let Some(tight) = structure.loosened(let_go.from) {
+            self.belief.release(tight);
+            Arc::make_mut(&mut self.failed).push(let_go.from);
+        }
+        self.belief.rebase(structure, let_go.from, &let_go.moved)
     }
 
     /// X given G, eq. (10). On an error poses stay where they were, and covariances are unknown.

@@ -14,7 +14,9 @@
 //! After a break of odometry the prediction is no Gaussian: mostly the robot is where it was, else anywhere on
 //! the floor that was driven, or on new ground, [`started`].
 
+use crate::edge::Vertex;
 use crate::filter::chance::{log_add, log_chance};
+use crate::filter::failure::{LetGo, log_failed};
 use crate::filter::loops::{AGREE_M, AGREE_RAD, agree};
 use crate::filter::particle::{Edge, Particle};
 use crate::filter::propose::LOST_SIGMA_M;
@@ -22,7 +24,7 @@ use crate::geometry::wrap;
 use crate::graph::Graph;
 use crate::smoothing::{Relative, Structure};
 use nalgebra::{Matrix3, Vector3};
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 /// p_D: how often a pair that truly overlaps yields a fit, and its neighbours as many as count.
 pub(crate) const DETECTED: f64 = 0.8;
@@ -35,6 +37,9 @@ const STAYED_SIGMA: [f64; 3] = [0.5, 0.5, 0.5];
 const SOMEWHERE: f64 = 0.4;
 const PLACE_M2: f64 = 2.0;
 
+/// A fit that a chain explains worse than chance by so much may be one across a stretch that failed.
+const UNEXPLAINED: f64 = -4.0;
+
 /// What a particle thinks of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Judgement {
@@ -45,20 +50,48 @@ pub struct Judgement {
     /// Whether the particle ties the two places already, and where z has them: with the edge and without
     /// its map is the same.
     pub known: bool,
+    /// What the particle lets go to have the robot there, if it has to.
+    pub lets_go: Option<LetGo>,
 }
 
 /// Eq. (18) of a fit, as the edge that it would be. R is that by which the edge is inserted.
 pub fn judge(graph: &Graph, structure: &Structure, particle: &Particle, edge: &Edge) -> Option<Judgement> {
     let predicted = particle.belief.relative(structure, edge.j, &[edge.i]).ok()?.into_iter().next()?;
+    let (log_n, distance2) = log_density(&predicted, edge)?;
+    let held = DETECTED.ln() + edge.log_looks + log_n - log_chance(turned_rad(&predicted, edge), {
+        (predicted.covariance[(2, 2)] + edge.covariance[(2, 2)]).sqrt()
+    });
+    let judged = Judgement { log_there: held, distance2, known: is_known(&predicted, edge), lets_go: None };
+    let otherwise = DETECTED.ln() + edge.log_looks - log_chance(0.0, PI);
     let broken =
         predicted.sigma_m() > LOST_SIGMA_M && graph.place(edge.i).segment != graph.place(edge.j).segment;
-    let (gauss, distance2) = log_density(&predicted, edge)?;
-    let log_n = if broken { started(&predicted, edge, graph.places().len())? } else { gauss };
-    let s = (predicted.covariance[(2, 2)] + edge.covariance[(2, 2)]).sqrt();
-    let turned = wrap(edge.i_from_j.yaw_rad - predicted.i_from_a.yaw_rad);
-    let log_there = DETECTED.ln() + edge.log_looks + log_n - log_chance(turned, s);
-    let known = is_known(&predicted, edge);
-    log_there.is_finite().then_some(Judgement { log_there, distance2, known })
+    let judged = if broken {
+        let log_there = otherwise + started(&predicted, edge, graph.places().len())?;
+        Judgement { log_there, lets_go: start(graph, particle, edge), ..judged }
+    } else if held < UNEXPLAINED {
+        log_failed(graph, particle, edge).map_or(judged, |(log_f, let_go)| {
+            if otherwise + log_f > held {
+                Judgement { log_there: otherwise + log_f, lets_go: Some(let_go), ..judged }
+            } else {
+                judged
+            }
+        })
+    } else {
+        judged
+    };
+    judged.log_there.is_finite().then_some(judged)
+}
+
+/// The start of the newest segment, moved to where an edge has it.
+fn start(graph: &Graph, particle: &Particle, edge: &Edge) -> Option<LetGo> {
+    let from = (edge.i + 1..=edge.j).rev().find(|&v| graph.place(v).chain.broken)?;
+    let pose = |v: Vertex| particle.belief.pose(v);
+    let moved = pose(edge.i).compose(&edge.i_from_j).compose(&pose(edge.j).inverse());
+    Some(LetGo { from, moved })
+}
+
+fn turned_rad(predicted: &Relative, edge: &Edge) -> f64 {
+    wrap(edge.i_from_j.yaw_rad - predicted.i_from_a.yaw_rad)
 }
 
 /// log N(z; h, S), with the tail of N, and z's Mahalanobis distance² from the prediction.

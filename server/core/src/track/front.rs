@@ -44,6 +44,9 @@ const VAGUE_RAD: f64 = 0.07;
 /// (example `drives` of the server), and a real log, where it just covers: clutter errs more than noise does.
 const BEND: Vector3<f64> = Vector3::new(0.2, 0.2, 0.05);
 
+/// φ of a stretch of which nothing speaks: one in ten kilometres.
+const FAILED_MIN: f64 = 1e-4;
+
 /// A scan in the local map.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Key {
@@ -76,6 +79,8 @@ pub struct Chain {
     pub information: Matrix3<f64>,
     /// Whether odometry broke between the two: they are tied by next to nothing.
     pub broken: bool,
+    /// φ: probability that it says something else than what happened.
+    pub failed: f64,
 }
 
 /// A place that is left behind: it may now be matched.
@@ -287,7 +292,7 @@ impl FrontEnd {
         let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
         let bend = Matrix3::from_diagonal(&BEND.component_mul(&BEND)) * ((1.0 + d_m) * self.rough_m.powi(2));
         let information = (self.since_place + bend).try_inverse().unwrap_or_else(Matrix3::identity);
-        let chain = Chain { previous_from_this, information, broken };
+        let chain = Chain { previous_from_this, information, broken, failed: FAILED_MIN };
         self.open.push_back(OpenPlace {
             id: self.next_place,
             stamp_ns,

@@ -1,0 +1,121 @@
+//! Stretches of the chain that failed: the front end lost its way there and says otherwise.
+//!
+//! A fit z between places i and t that no held chain explains may be one across a stretch s, i < s ≤ t, that
+//! failed. Then the two ends of s lie to each other, in closed form,
+//!
+//! ```text
+//! T* = (x_{s−1}⁻¹ x_i) · z · (x_t⁻¹ x_s),    δ = z_s⁻¹ T*
+//! w_failed / w_elsewhere = φ_s f_s(δ) · p_D / λ_c(z)
+//! ```
+//!
+//! with z_s what the chain says, φ_s the probability that it fails, and f_s where the robot is then: wheels
+//! slipped along the way, it turned unseen, or it is anywhere near. A wide Gaussian would not do: half a turn
+//! is not linear. Which stretch it was hardly matters to the map: their weights are summed, and the likeliest
+//! one is let go. A start after a break is the same with φ = 1, see [`crate::filter::weigh`].
+
+use crate::edge::Vertex;
+use crate::filter::chance::log_add;
+use crate::filter::particle::{Edge, Particle};
+use crate::geometry::Pose2;
+use crate::graph::Graph;
+use std::f64::consts::TAU;
+
+/// Fits across longer stretches of places are not explained by failures.
+const PLACES_MAX: u32 = 400;
+/// Shares of failures by kind, and their spreads: along the way, by a turn, and anywhere.
+const SLIPPED: (f64, [f64; 3]) = (0.4, [1.5, 0.2, 0.15]);
+const TURNED: (f64, [f64; 2]) = (0.4, [0.4, 0.4]);
+const ANYWHERE: f64 = 0.2;
+const ANYWHERE_M2: f64 = 400.0;
+
+/// A stretch let go: the poses from `from` on are moved rigidly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LetGo {
+    /// The place whose edge from the one before failed.
+    pub from: Vertex,
+    /// What was at p is at `moved ∘ p`.
+    pub moved: Pose2,
+}
+
+/// log Σ_s φ_s f_s(δ_s) of an edge that the particle's chain does not explain, in m⁻² rad⁻¹, and the
+/// likeliest stretch.
+pub fn log_failed(graph: &Graph, particle: &Particle, edge: &Edge) -> Option<(f64, LetGo)> {
+    let pose = |v: Vertex| particle.belief.pose(v);
+    // Where an older edge ties the path, what came before is in order.
+    let tied = particle.edges.iter().map(|e| e.j).filter(|&j| j < edge.j).max().unwrap_or(0);
+    let first = tied.max(edge.i).max(edge.j.saturating_sub(PLACES_MAX)) + 1;
+    let there = pose(edge.i).compose(&edge.i_from_j).compose(&pose(edge.j).inverse());
+    let (mut sum, mut best): (f64, Option<(f64, Vertex)>) = (f64::NEG_INFINITY, None);
+    for s in first..=edge.j {
+        let chain = &graph.place(s).chain;
+        let needed = pose(s - 1).between(&there.compose(&pose(s)));
+        let log = chain.failed.max(f64::MIN_POSITIVE).ln()
+            + log_f(&chain.previous_from_this.between(&needed));
+        sum = log_add(sum, log);
+        if best.is_none_or(|(most, _)| log > most) {
+            best = Some((log, s));
+        }
+    }
+    best.map(|(_, from)| (sum, LetGo { from, moved: there }))
+}
+
+/// log f(δ), m⁻² rad⁻¹.
+fn log_f(off: &Pose2) -> f64 {
+    let normal = |x: f64, sigma: f64| -0.5 * (x / sigma).powi(2) - (sigma * TAU.sqrt()).ln();
+    let (share, [along, across, turn]) = SLIPPED;
+    let slipped =
+        share.ln() + normal(off.x_m, along) + normal(off.y_m, across) + normal(off.yaw_rad, turn);
+    let (share, [x, y]) = TURNED;
+    let turned = share.ln() + normal(off.x_m, x) + normal(off.y_m, y) - TAU.ln();
+    let near = off.x_m.abs().max(off.y_m.abs()) < 0.5 * ANYWHERE_M2.sqrt();
+    let anywhere = if near { (ANYWHERE / (ANYWHERE_M2 * TAU)).ln() } else { f64::NEG_INFINITY };
+    log_add(log_add(slipped, turned), anywhere)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::filter::loops::tests::straight;
+    use crate::filter::weigh::tests::{chain, edge, fit};
+
+    #[test]
+    fn where_a_robot_is_that_lost_its_way_is_a_density() {
+        let mut mass = 0.0;
+        let (cell_m, cell_rad) = (0.2, TAU / 64.0);
+        for a in -120..=120 {
+            for b in -120..=120 {
+                for c in 0..64 {
+                    let off = Pose2::new(
+                        f64::from(a) * cell_m,
+                        f64::from(b) * cell_m,
+                        crate::geometry::wrap(f64::from(c) * cell_rad),
+                    );
+                    mass += log_f(&off).exp() * cell_m * cell_m * cell_rad;
+                }
+            }
+        }
+        assert!((mass - 1.0).abs() < 0.03, "{mass}");
+    }
+
+    #[test]
+    fn the_stretch_that_contradicts_itself_is_let_go_and_the_rest_moves_rigidly() {
+        let (_, p) = chain(21, 0.01);
+        let mut graph = straight(21);
+        graph.doubt(13, 0.3);
+        let e = edge(&fit(17.0, 0.9, 6));
+        let (log, let_go) = log_failed(&graph, &p, &e).unwrap();
+        assert_eq!(let_go.from, 13);
+        assert!((let_go.moved.compose(&p.belief.pose(20)).x_m - 17.0).abs() < 1e-6);
+        assert!(log > (0.3 * 0.001_f64).ln(), "{log}");
+    }
+
+    #[test]
+    fn a_failure_before_an_older_loop_explains_nothing() {
+        let (_, mut p) = chain(21, 0.01);
+        let mut tie = edge(&fit(19.0, 0.9, 6));
+        tie.j = 19;
+        p.add(Edge { factor: 0, ..tie });
+        let (_, let_go) = log_failed(&straight(21), &p, &edge(&fit(17.0, 0.9, 6))).unwrap();
+        assert_eq!(let_go.from, 20);
+    }
+}
