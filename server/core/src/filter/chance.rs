@@ -19,11 +19,11 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// Weights of [`looks`]. Learned by `--example drives -- chance` of the server from simulated drives with
 /// people about (`server/ARCHITECTURE.md`).
-pub const LOOKS: [f64; 4] = [2.52, -2.75, 1.70, -2.28];
+pub const LOOKS: [f64; 4] = [1.92, -1.88, 1.17, -1.74];
 /// V: the area in which a pair is searched, m².
 const SEARCHED_M2: f64 = 400.0;
 /// ν: copies of a stretch, as far as scans can tell, in such an area …
-const COPIES: f64 = 1.6;
+const COPIES: f64 = 0.8;
 /// … and π_m: their headings, by quarter turns.
 const TURNED: [f64; 4] = [0.7, 0.1, 0.1, 0.1];
 /// Shares of contradicted points by which they are scaled, and below which they are not known to be.
