@@ -198,10 +198,11 @@ impl Belief {
             let by_cholesky = self
                 .assembled(structure, clique)
                 .and_then(|mut front| front.eliminate().is_ok().then_some(front));
-            let front = match by_cholesky {
+            let mut front = match by_cholesky {
                 Some(front) => front,
                 None => qr::eliminated(structure, self, clique)?,
             };
+            front.sums = self.sums_of(structure, clique, &front);
             *self.fronts.make_mut(c as usize) = Some(Arc::new(front));
         }
         Ok(())
