@@ -44,6 +44,9 @@ pub struct Belief {
     pub(super) solution: u32,
     /// Factors held or let go since the last update.
     pub(super) changed: Vec<FactorId>,
+    /// Poses that may be farther from their linearisation points than an update minds, in order: it looks at
+    /// these alone.
+    pub(super) strayed: Vec<u32>,
     /// Whether poses far from their linearisation points wait for their turn.
     pub(super) pending: bool,
     marginalised: usize,
