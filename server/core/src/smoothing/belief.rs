@@ -3,6 +3,7 @@
 
 use crate::geometry::Pose2;
 use crate::smoothing::chunked::Chunked;
+use crate::smoothing::evidence::Sums;
 use crate::smoothing::factor::{At, residual};
 use crate::smoothing::frames::Frames;
 use crate::smoothing::front::Front;
@@ -43,9 +44,14 @@ pub struct Belief {
     pub(super) solution: u32,
     /// Factors held or let go since the last update.
     pub(super) changed: Vec<FactorId>,
+    /// Poses that may be farther from their linearisation points than an update minds, in order: it looks at
+    /// these alone.
+    pub(super) strayed: Vec<u32>,
     /// Whether poses far from their linearisation points wait for their turn.
     pub(super) pending: bool,
     marginalised: usize,
+    /// What marginalised poses left of the evidence.
+    pub(super) left: Sums,
     /// Cliques below those solved anew whose poses lag, with their serials.
     pub(super) below: Vec<(u32, u32)>,
     /// Solution, and arrangement, at which no pose lagged.
@@ -164,9 +170,10 @@ impl Belief {
 
     /// The objective at the poses: `Σ eᵀ Ω e` over the factors held.
     pub fn chi2(&self, structure: &Structure) -> f64 {
+        let poses: Vec<At> = self.poses().into_iter().map(At::new).collect();
         let cost = |(id, entry): (usize, &Entry)| match entry {
-            Entry::Between(f, _) if self.has(structure, id as FactorId) => {
-                f.cost(self.pose(f.i), self.pose(f.j))
+            Entry::Between(f, z) if self.has(structure, id as FactorId) => {
+                f.cost(z, &poses[f.i as usize], &poses[f.j as usize])
             }
             _ => 0.0,
         };
@@ -206,9 +213,10 @@ impl Belief {
         }
         let from = self.marginalised - structure.marginalised_before;
         for one in &structure.marginalised[from..] {
-            if let Some((id, poses)) = &one.prior {
-                let prior = Prior::left_by(one, poses, structure, self)?;
-                Arc::make_mut(&mut self.priors).push((*id, Arc::new(prior)));
+            let (sums, prior) = Prior::left_by(one, structure, self)?;
+            self.left += sums;
+            if let (Some(id), Some(prior)) = (one.prior, prior) {
+                Arc::make_mut(&mut self.priors).push((id, Arc::new(prior)));
             }
         }
         self.marginalised = all;

@@ -15,7 +15,7 @@ use crate::geometry::Pose2;
 use crate::smoothing::factor::{sandwich, symmetrised};
 use crate::smoothing::inverse::Sigma;
 use crate::smoothing::structure::Structure;
-use crate::smoothing::tree::{Clique, NONE};
+use crate::smoothing::tree::Clique;
 use crate::smoothing::{Belief, SmoothError};
 use nalgebra::{Dyn, Matrix3, MatrixView, MatrixXx3, U1, U3};
 use std::hint::black_box;
@@ -188,8 +188,7 @@ impl Belief {
     ) -> Result<(), SmoothError> {
         let cliques = &structure.tree.cliques;
         let mut stack: Vec<(u32, Option<Rc<Sigma>>)> = Vec::new();
-        let roots = cliques.iter().enumerate().filter(|(_, c)| c.frontals > 0 && c.parent == NONE);
-        stack.extend(roots.map(|(c, _)| (c as u32, None)));
+        stack.extend(structure.tree.roots.iter().map(|&c| (c, None)));
         while let Some((c, above)) = stack.pop() {
             let clique = &cliques[c as usize];
             let Some(front) = &self.fronts[c as usize] else { return Err(SmoothError::Behind) };

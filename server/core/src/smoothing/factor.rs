@@ -104,9 +104,9 @@ impl Residual {
 }
 
 impl Factor {
-    /// `eᵀ Ω e` at two poses.
-    pub(super) fn cost(&self, x_i: Pose2, x_j: Pose2) -> f64 {
-        let e = residual(&At::new(self.i_from_j), &At::new(x_i), &At::new(x_j)).error;
+    /// `eᵀ Ω e` at two poses; z with its cosine and sine.
+    pub(super) fn cost(&self, z: &At, x_i: &At, x_j: &At) -> f64 {
+        let e = residual(z, x_i, x_j).error;
         e.dot(&(self.information * e))
     }
 

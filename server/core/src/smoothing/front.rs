@@ -13,12 +13,14 @@
 // Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
 #![allow(clippy::inline_always)]
 
+use crate::smoothing::evidence::Sums;
 use crate::smoothing::kernels::{
     Ill, back, block_of, columns_of, dots, eliminate_panel, offset, rows_of, solve_lower, subtract_products,
     wide,
 };
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
+use std::f64::consts::TAU;
 
 /// Where a pose keeps less than this share of its diagonal, what it keeps is rounding for a good
 /// part: such a front is better eliminated by QR.
@@ -32,6 +34,8 @@ pub(super) struct Front {
     /// How many of them are eliminated here.
     pub frontals: usize,
     values: Vec<f64>,
+    /// Its part of the evidence and that of all below it, once it is eliminated.
+    pub sums: Sums,
     /// `[R | d]` of what is left on the separators, where `RᵀR` would lose digits of it.
     root: Option<Box<Mat<f64>>>,
 }
@@ -44,7 +48,13 @@ impl Front {
 
     /// Zeros.
     pub fn new(blocks: usize, frontals: usize) -> Self {
-        Self { blocks, frontals, values: vec![0.0; offset(blocks, blocks)], root: None }
+        Self {
+            blocks,
+            frontals,
+            values: vec![0.0; offset(blocks, blocks)],
+            sums: Sums::default(),
+            root: None,
+        }
     }
 
     /// Rows of a panel, the right-hand side's counted.
@@ -233,6 +243,19 @@ impl Front {
             front.root = Some(Box::new(separators.to_owned()));
         }
         Some(front)
+    }
+
+    /// What the frontals' elimination adds to the evidence: `−dᵀd` and `−½ log|L Lᵀ/2π|`.
+    pub fn eliminated(&self) -> Sums {
+        let mut sums = Sums::default();
+        for j in 0..self.frontals {
+            let diagonal = self.diagonal(j);
+            sums.log_weight += 1.5 * TAU.ln() - (diagonal[0] * diagonal[1] * diagonal[2]).ln();
+            for d in self.columns(j).map(|column| column[column.len() - 1]) {
+                sums.chi2 -= d * d;
+            }
+        }
+        sums
     }
 
     fn diagonal(&self, j: usize) -> [f64; 3] {

@@ -6,7 +6,8 @@
 //! between-factor. r is one that v held well: from one hardly known relative to the others, or not at
 //! all where a particle lacks the factor, the others would seem to bend when they turn together.
 
-use crate::smoothing::factor::{At, residual};
+use crate::smoothing::evidence::Sums;
+use crate::smoothing::factor::{At, Linearised, Residual, residual};
 use crate::smoothing::front::Front;
 use crate::smoothing::structure::{Marginalised, Structure};
 use crate::smoothing::tree::{Entry, NONE};
@@ -40,6 +41,44 @@ impl System {
         Self { h: DMatrix::zeros(3 * poses, 3 * poses), b: DVector::zeros(3 * poses) }
     }
 
+    /// Of a pose's factors, at the belief's estimate: the pose itself first, then its neighbours.
+    fn of(one: &Marginalised, poses: &[u32], structure: &Structure, belief: &Belief) -> (Self, Sums) {
+        // In the frame of the pose itself, which loses no digits far from the origin.
+        let own = belief.pose(one.pose);
+        let at = |p: u32| At::new(own.between(&belief.pose(p)));
+        let place = |p: u32| poses.binary_search(&p).map_or(0, |k| k + 1);
+        let (mut system, mut sums) = (Self::zeros(poses.len() + 1), Sums::default());
+        for (id, entry) in one.factors.iter().filter(|(id, _)| belief.has(structure, *id)) {
+            let places: Vec<usize> = entry.poses().map(place).collect();
+            match entry {
+                Entry::Between(f, z) => {
+                    let r = residual(z, &at(f.i), &at(f.j));
+                    sums += Sums::of_factor(&r.error, &f.information);
+                    system.add(&Self::of_factor(&r.weighted(&f.information)), &places);
+                }
+                Entry::Prior(of) => {
+                    if let Some(prior) = belief.prior(*id) {
+                        sums.chi2 += prior.cost(of, at);
+                        system.add(&prior.linearised(of, at), &places);
+                    }
+                }
+                Entry::Removed => {}
+            }
+        }
+        (system, sums)
+    }
+
+    fn of_factor(part: &Linearised) -> Self {
+        let mut two = Self::zeros(2);
+        two.h.fixed_view_mut::<3, 3>(0, 0).copy_from(&part.h_ii);
+        two.h.fixed_view_mut::<3, 3>(0, 3).copy_from(&part.h_ij);
+        two.h.fixed_view_mut::<3, 3>(3, 0).copy_from(&part.h_ij.transpose());
+        two.h.fixed_view_mut::<3, 3>(3, 3).copy_from(&part.h_jj);
+        two.b.fixed_rows_mut::<3>(0).copy_from(&part.b_i);
+        two.b.fixed_rows_mut::<3>(3).copy_from(&part.b_j);
+        two
+    }
+
     /// Adds a system over the poses at `places`.
     fn add(&mut self, part: &Self, places: &[usize]) {
         for (a, &r) in places.iter().enumerate() {
@@ -63,44 +102,25 @@ impl System {
 }
 
 impl Prior {
-    /// The prior that a pose's factors leave on `poses`, at the belief's estimate.
+    /// What a pose's factors leave at the belief's estimate: of the evidence, and the prior on its
+    /// neighbours where there are some.
     pub fn left_by(
         one: &Marginalised,
-        poses: &[u32],
         structure: &Structure,
         belief: &Belief,
-    ) -> Result<Self, SmoothError> {
-        // In the frame of the pose itself, which loses no digits far from the origin.
-        let own = belief.pose(one.pose);
-        let at = |p: u32| At::new(own.between(&belief.pose(p)));
-        // The pose itself first, then its neighbours.
-        let place = |p: u32| poses.binary_search(&p).map_or(0, |k| k + 1);
-        let mut system = System::zeros(poses.len() + 1);
-        for (id, entry) in one.factors.iter().filter(|(id, _)| belief.has(structure, *id)) {
-            let places: Vec<usize> = entry.poses().map(place).collect();
-            match entry {
-                Entry::Between(f, z) => {
-                    let part = residual(z, &at(f.i), &at(f.j)).weighted(&f.information);
-                    let mut two = System::zeros(2);
-                    two.h.fixed_view_mut::<3, 3>(0, 0).copy_from(&part.h_ii);
-                    two.h.fixed_view_mut::<3, 3>(0, 3).copy_from(&part.h_ij);
-                    two.h.fixed_view_mut::<3, 3>(3, 0).copy_from(&part.h_ij.transpose());
-                    two.h.fixed_view_mut::<3, 3>(3, 3).copy_from(&part.h_jj);
-                    two.b.fixed_rows_mut::<3>(0).copy_from(&part.b_i);
-                    two.b.fixed_rows_mut::<3>(3).copy_from(&part.b_j);
-                    system.add(&two, &places);
-                }
-                Entry::Prior(of) => {
-                    if let Some(prior) = belief.prior(*id) {
-                        system.add(&prior.linearised(of, at), &places);
-                    }
-                }
-                Entry::Removed => {}
-            }
+    ) -> Result<(Sums, Option<Self>), SmoothError> {
+        let mut poses: Vec<u32> = one.factors.iter().flat_map(|(_, entry)| entry.poses()).collect();
+        poses.sort_unstable();
+        poses.dedup();
+        poses.retain(|&p| p != one.pose);
+        let (system, mut sums) = System::of(one, &poses, structure, belief);
+        let pivot = system.h.fixed_view::<3, 3>(0, 0).into_owned();
+        sums.eliminate(&pivot, &system.b.fixed_rows::<3>(0).into_owned());
+        if one.prior.is_none() {
+            return Ok((sums, None));
         }
         let reference = system.well_held();
         let rest: Vec<usize> = (0..3 * poses.len()).filter(|k| k / 3 != reference).map(|k| k + 3).collect();
-        let pivot = system.h.fixed_view::<3, 3>(0, 0).into_owned();
         let inverse = pivot.cholesky().ok_or(SmoothError::Singular)?.inverse();
         let across = system.h.columns(0, 3).select_rows(&rest);
         let gain = &across * inverse;
@@ -109,21 +129,33 @@ impl Prior {
         let from = belief.pose(poses[reference]);
         let others = poses.iter().enumerate().filter(|(k, _)| *k != reference);
         let z = others.map(|(_, &p)| At::new(from.between(&belief.pose(p)))).collect();
-        Ok(Self { reference, z, h: (&h + h.transpose()) * 0.5, b })
+        Ok((sums, Some(Self { reference, z, h: (&h + h.transpose()) * 0.5, b })))
+    }
+
+    /// ξ at some poses, and its derivatives.
+    fn xi(&self, poses: &[u32], at: &impl Fn(u32) -> At) -> (DVector<f64>, Vec<Residual>) {
+        let reference = at(poses[self.reference]);
+        let others = poses.iter().enumerate().filter(|(place, _)| *place != self.reference);
+        let each = self.z.iter().zip(others).map(|(z, (_, &p))| residual(z, &reference, &at(p)));
+        let each: Vec<Residual> = each.collect();
+        (DVector::from_iterator(3 * each.len(), each.iter().flat_map(|r| r.error.iter().copied())), each)
+    }
+
+    /// `ξᵀ H ξ − 2 bᵀ ξ`: by how much χ² is above where the poses were.
+    pub fn cost(&self, poses: &[u32], at: impl Fn(u32) -> At) -> f64 {
+        let (xi, _) = self.xi(poses, &at);
+        xi.dot(&(&self.h * &xi - 2.0 * &self.b))
     }
 
     /// H and b of steps of the poses.
     fn linearised(&self, poses: &[u32], at: impl Fn(u32) -> At) -> System {
         let n = self.z.len();
-        let reference = at(poses[self.reference]);
+        let (xi, each) = self.xi(poses, &at);
         let mut jacobian = DMatrix::zeros(3 * n, 3 * n + 3);
-        let mut xi = DVector::zeros(3 * n);
-        let others = poses.iter().enumerate().filter(|(place, _)| *place != self.reference);
-        for (k, (z, (place, &p))) in self.z.iter().zip(others).enumerate() {
-            let r = residual(z, &reference, &at(p));
+        let others = (0..poses.len()).filter(|place| *place != self.reference);
+        for (k, (r, place)) in each.iter().zip(others).enumerate() {
             jacobian.fixed_view_mut::<3, 3>(3 * k, 3 * self.reference).copy_from(&r.j_i);
             jacobian.fixed_view_mut::<3, 3>(3 * k, 3 * place).copy_from(&r.j_j);
-            xi.fixed_rows_mut::<3>(3 * k).copy_from(&r.error);
         }
         let b = jacobian.tr_mul(&(&self.b - &self.h * xi));
         System { h: jacobian.tr_mul(&(&self.h * &jacobian)), b }

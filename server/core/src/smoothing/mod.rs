@@ -24,6 +24,7 @@
 //! | L, η | a clique's share of them, for one particle | [`front`]; by QR where digits are few: [`qr`] |
 //! | x̄, δ | linearisation points and steps of one particle | [`belief`], in [`frames`]; brought up to date in [`update`] |
 //! | Σ_jj, Σ_tj | covariances | [`covariance`]; of all poses by the selected [`inverse`] |
+//! | p(z) | how well factors go together | [`evidence`] |
 //! | p(X \ x_v) | what a marginalised pose leaves | [`marginal`] |
 //!
 //! What all particles share is the [`Structure`]; a [`Belief`] is one particle's numbers, in chunks
@@ -38,6 +39,7 @@
 mod belief;
 mod chunked;
 mod covariance;
+mod evidence;
 mod factor;
 mod frames;
 mod front;
@@ -55,6 +57,7 @@ mod update;
 
 pub use belief::Belief;
 pub use covariance::{Joint, JointPart, JointRoom, Relative};
+pub use evidence::LogDensity;
 pub use factor::Factor;
 pub use smoother::Smoother;
 pub use structure::Structure;

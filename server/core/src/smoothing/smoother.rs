@@ -148,6 +148,11 @@ impl Smoother {
         self.belief.chi2(&self.structure)
     }
 
+    /// See [`Belief::log_evidence`].
+    pub fn log_evidence(&self) -> f64 {
+        self.belief.log_evidence(&self.structure)
+    }
+
     /// See [`Belief::marginal`].
     pub fn marginal(&self, i: u32) -> Matrix3<f64> {
         self.belief.marginal(&self.structure, i)

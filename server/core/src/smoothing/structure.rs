@@ -74,8 +74,8 @@ pub(super) struct Marginalised {
     pub pose: u32,
     /// Its factors, which the prior replaces.
     pub factors: Vec<(FactorId, Entry)>,
-    /// The prior's factor and poses; None where it had one neighbour, of which it said nothing.
-    pub prior: Option<(FactorId, Vec<u32>)>,
+    /// The prior's factor; None where it had one neighbour, of which it said nothing.
+    pub prior: Option<FactorId>,
 }
 
 impl Structure {
@@ -254,8 +254,7 @@ impl Structure {
             }
         }
         self.gone.push(pose);
-        let prior = (neighbours.len() > 1)
-            .then(|| (self.push_entry(Entry::Prior(neighbours.clone()), Holders::All), neighbours));
+        let prior = (neighbours.len() > 1).then(|| self.push_entry(Entry::Prior(neighbours), Holders::All));
         self.marginalised.push(Marginalised { pose, factors, prior });
     }
 

@@ -4,6 +4,7 @@ mod batch;
 mod bounds;
 mod deep;
 mod dense;
+mod evidence;
 mod exact;
 mod loosened;
 mod particles;

@@ -93,6 +93,8 @@ pub(super) struct Tree {
     pub clique_of_factor: Vec<u32>,
     /// Cliques made last, children first.
     pub fresh: Vec<u32>,
+    /// Cliques without a parent.
+    pub roots: Vec<u32>,
     serial: u32,
     rank: u64,
     #[serde(skip)]
@@ -172,12 +174,14 @@ impl Tree {
         if !gone.is_empty() {
             work.poses.retain(|p| gone.binary_search(p).is_err());
         }
+        self.roots.retain(|&c| self.cliques[c as usize].frontals > 0);
         work.local.resize(self.clique_of.len(), NONE);
         self.fresh.clear();
         if !work.poses.is_empty() {
             self.order(entries, &mut work, new_factors.len());
             work.group();
             self.build(entries, &mut work);
+            self.roots.extend(self.fresh.iter().filter(|&&c| self.cliques[c as usize].parent == NONE));
         }
         self.free.extend(affected);
         self.work = work;

@@ -198,10 +198,11 @@ impl Belief {
             let by_cholesky = self
                 .assembled(structure, clique)
                 .and_then(|mut front| front.eliminate().is_ok().then_some(front));
-            let front = match by_cholesky {
+            let mut front = match by_cholesky {
                 Some(front) => front,
                 None => qr::eliminated(structure, self, clique)?,
             };
+            front.sums = self.sums_of(structure, clique, &front);
             *self.fronts.make_mut(c as usize) = Some(Arc::new(front));
         }
         Ok(())
@@ -283,12 +284,40 @@ impl Belief {
             let old = &self.steps[p as usize].by;
             let change = step.iter().zip(old).map(|(new, old)| (new - old).abs()).fold(0.0, f64::max);
             let stiffness = &structure.stiffness[p as usize];
-            if change * stiffness.per_m > effort.passed_on {
-                self.farthest = self.farthest.max(farness(&step, stiffness));
+            let passed_on = change * stiffness.per_m > effort.passed_on;
+            // One that stays may mind more than it did, for a new factor.
+            let by = farness(if passed_on { &step } else { old }, stiffness);
+            if by > Effort::USUAL.far
+                && let Err(at) = self.strayed.binary_search(&p)
+            {
+                self.strayed.insert(at, p);
+            }
+            if passed_on {
+                self.farthest = self.farthest.max(by);
                 *self.steps.make_mut(p as usize) = Step { by: step, moved: self.solution };
             }
         }
         Ok(())
+    }
+
+    /// Poses that are to be linearised anew, and how far they went.
+    fn far(&mut self, structure: &Structure, effort: &Effort) -> Vec<(f64, u32)> {
+        let stray = |p: u32| farness(&self.steps[p as usize].by, &structure.stiffness[p as usize]);
+        let mut strayed = std::mem::take(&mut self.strayed);
+        strayed.retain(|&p| !structure.is_marginalised[p as usize] && stray(p) > Effort::USUAL.far);
+        let by = |p: u32| {
+            let step = self.steps[p as usize].by.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+            (stray(p).max(effort.far * (step / effort.moved)), p)
+        };
+        let is_far = |&(by, p): &(f64, u32)| by > effort.far && !structure.is_marginalised[p as usize];
+        // Less than an update minds: of any pose.
+        let far = if effort.far < Effort::USUAL.far {
+            (0..self.steps.len() as u32).map(by).filter(is_far).collect()
+        } else {
+            strayed.iter().copied().map(by).filter(is_far).collect()
+        };
+        self.strayed = strayed;
+        far
     }
 
     /// Linearises the poses farthest from their points anew, as many as the budget allows.
@@ -299,13 +328,7 @@ impl Belief {
         descent: &mut Descent,
         work: &mut Work,
     ) -> Dirty {
-        let by = |(step, stiffness): (&Step, &Stiffness)| {
-            let moved = step.by.iter().fold(0.0, |most: f64, v| most.max(v.abs())) / effort.moved;
-            farness(&step.by, stiffness).max(effort.far * moved)
-        };
-        let mut far: Vec<(f64, u32)> = (self.steps.iter().zip(&structure.stiffness).map(by).zip(0..))
-            .filter(|&(by, p)| by > effort.far && !structure.is_marginalised[p as usize])
-            .collect();
+        let mut far = self.far(structure, effort);
         far.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
         self.pending = false;
         let mut dirty = Dirty::new();

@@ -2,7 +2,7 @@
 
 use crate::geometry::Pose2;
 use crate::smoothing::tests::dense::{Graph, Term, chart};
-use crate::smoothing::tests::script::{GOOD, Script};
+use crate::smoothing::tests::script::{GOOD, Script, Sigma};
 use factrs::assign_symbols;
 use factrs::containers::{Factor, FactorBuilder, Graph as Batch, Values};
 use factrs::linalg::{Const, ForwardProp, Matrix3, Numeric, VectorX};
@@ -66,7 +66,7 @@ fn optimise(graph: &mut Graph) {
 }
 
 /// A walk along the streets of a city of square blocks, which loops where it was before.
-fn manhattan(seed: u64, poses: u32, loops: usize) -> Script {
+pub fn manhattan(seed: u64, poses: u32, loops: usize, sigma: Sigma) -> Script {
     let mut s = Script::new(seed);
     while s.newest() + 1 < poses {
         let j = s.newest() + 1;
@@ -77,12 +77,12 @@ fn manhattan(seed: u64, poses: u32, loops: usize) -> Script {
             0 => FRAC_PI_2 * f64::from(s.rng.random_range(-1..=1)),
             _ => 0.0,
         };
-        s.extend(Pose2::new(1.0, 0.0, turn), GOOD);
+        s.extend(Pose2::new(1.0, 0.0, turn), sigma);
         let near = |i: &u32| s.truth[*i as usize].distance_m(&s.truth[j as usize]) < 1.5;
         let near: Vec<u32> = (0..j.saturating_sub(20)).filter(near).collect();
         if !near.is_empty() && s.loops.len() < loops && s.rng.random_bool(0.6) {
             let i = near[s.rng.random_range(0..near.len())];
-            s.close(i, j, GOOD);
+            s.close(i, j, sigma);
         }
         s.smoother.update().unwrap();
     }
@@ -92,7 +92,7 @@ fn manhattan(seed: u64, poses: u32, loops: usize) -> Script {
 #[test]
 fn settled_it_is_where_levenberg_marquardt_ends() {
     for seed in 0..3 {
-        let mut s = manhattan(seed, 300, 100);
+        let mut s = manhattan(seed, 300, 100, GOOD);
         assert_eq!((s.smoother.len(), s.loops.len()), (300, 100));
         s.smoother.settle().unwrap();
         // From dead reckoning.

@@ -5,6 +5,7 @@ use crate::geometry::{Pose2, wrap};
 use crate::smoothing::Factor;
 use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use std::collections::BTreeMap;
+use std::f64::consts::TAU;
 
 /// A part of the objective: `eᵀ W e − 2 bᵀ e`.
 #[derive(Clone, Debug)]
@@ -29,6 +30,8 @@ pub struct Left {
 pub struct Graph {
     pub poses: BTreeMap<u32, Pose2>,
     pub terms: BTreeMap<u32, Term>,
+    /// Evidence of what was taken out, nats.
+    left: f64,
     next: u32,
 }
 
@@ -45,6 +48,12 @@ pub fn moved(p: &Pose2, d: &Vector3<f64>) -> Pose2 {
 /// The chart of `z⁻¹ · a⁻¹b`.
 pub fn error(z: &Pose2, a: &Pose2, b: &Pose2) -> Vector3<f64> {
     chart(&z.inverse().compose(&a.inverse().compose(b)))
+}
+
+/// `½ log|M/2π|`.
+fn half_log_det(m: &DMatrix<f64>) -> f64 {
+    let l = m.clone().cholesky().unwrap().unpack();
+    l.diagonal().map(|d| d.ln() - 0.5 * TAU.ln()).sum()
 }
 
 /// Derivative at zero by the central difference of eighth order; every third row is an angle.
@@ -103,6 +112,17 @@ impl Term {
             }
             Self::Left(left) => (left.w.clone(), left.b.clone()),
         }
+    }
+
+    /// Logarithm of its density at the poses, nats: `½ log|Ω/2π| − ½ eᵀ Ω e`; of what was left, but for a
+    /// constant.
+    fn log_density(&self, at: &[Pose2]) -> f64 {
+        let (e, (w, b)) = (self.error(at), self.weight());
+        let normaliser = match self {
+            Self::Between(_) => half_log_det(&w),
+            Self::Left(_) => 0.0,
+        };
+        normaliser - 0.5 * e.dot(&(w * &e - 2.0 * b))
     }
 
     /// `Jᵀ W J` and `Jᵀ (b − W e)`. Poses are taken relative to the first, which keeps digits.
@@ -169,6 +189,9 @@ impl Graph {
         let mut poses: Vec<u32> = alone.terms.values().flat_map(Term::poses).filter(|&p| p != pose).collect();
         poses.sort_unstable();
         poses.dedup();
+        let (h, g) = alone.system(&[pose], &at);
+        self.left += alone.log_densities(&at) - half_log_det(&h);
+        self.left += 0.5 * g.dot(&h.cholesky().unwrap().solve(&g));
         if poses.len() < 2 {
             return;
         }
@@ -193,6 +216,19 @@ impl Graph {
         self.insert(Term::Left(left));
     }
 
+    fn log_densities(&self, at: impl Fn(u32) -> Pose2) -> f64 {
+        let of = |term: &Term| term.log_density(&term.poses().iter().map(|&p| at(p)).collect::<Vec<_>>());
+        self.terms.values().map(of).sum()
+    }
+
+    /// Logarithm of the evidence by Laplace's method where the poses are, nats.
+    pub fn log_evidence(&self) -> f64 {
+        let free = self.but(0);
+        let h = self.system(&free, |p| self.poses[&p]).0;
+        let volume = if free.is_empty() { 0.0 } else { half_log_det(&h) };
+        self.left + self.log_densities(|p| self.poses[&p]) - volume
+    }
+
     /// Farthest coordinate, 1 m at least.
     pub fn extent_m(&self) -> f64 {
         self.poses.values().map(|p| p.x_m.hypot(p.y_m)).fold(1.0, f64::max)
@@ -208,7 +244,7 @@ impl Graph {
         let inside = |term: &Term| term.poses().iter().all(|p| *p >= first);
         let terms = self.terms.iter().filter(|(_, term)| inside(term));
         let poses = self.poses.range(first..).map(|(p, pose)| (*p, *pose)).collect();
-        Self { poses, terms: terms.map(|(k, term)| (*k, term.clone())).collect(), next: self.next }
+        Self { poses, terms: terms.map(|(k, term)| (*k, term.clone())).collect(), ..self.clone() }
     }
 
     /// Gauss–Newton from where the poses are to where they move no more, one of them fixed.

@@ -17,7 +17,7 @@ fn near(got: &Matrix3<f64>, want: &Matrix3<f64>, scale: f64) -> bool {
     (got - want).amax() <= COVARIANCES * scale
 }
 
-/// Poses, chi² and all covariances of a settled smoother.
+/// Poses, chi², evidence and all covariances of a settled smoother.
 pub fn check(s: &mut Script) -> Result<(), TestCaseError> {
     s.graph.solve(0);
     let extent = s.graph.extent_m();
@@ -27,6 +27,8 @@ pub fn check(s: &mut Script) -> Result<(), TestCaseError> {
     }
     let chi2 = s.graph.chi2();
     prop_assert!((s.smoother.chi2() - chi2).abs() < 1e-6 * (1.0 + chi2), "chi2 {chi2}");
+    let (got, want) = (s.smoother.log_evidence(), s.graph.log_evidence());
+    prop_assert!((got - want).abs() < 1e-6 * (1.0 + want.abs()), "evidence {got} {want}");
     check_absolute(s)?;
     s.present().into_iter().try_for_each(|a| check_relative(s, a))
 }

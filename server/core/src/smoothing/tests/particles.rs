@@ -49,6 +49,8 @@ impl Twin {
         }
         let chi2 = self.alone.chi2();
         prop_assert!((self.belief.chi2(structure) - chi2).abs() < 1e-6 * (1.0 + chi2));
+        let (got, want) = (self.belief.log_evidence(structure), self.alone.log_evidence());
+        prop_assert!((got - want).abs() < 1e-6 * (1.0 + want.abs()), "evidence {got} {want}");
         let a = present[present.len() / 2];
         let both =
             (self.belief.relative(structure, a, present).unwrap(), self.alone.relative(a, present).unwrap());
