@@ -5,12 +5,14 @@
 //! cargo run --release -p toponym-server --example drives -- chance drives/*
 //! cargo run --release -p toponym-server --example drives -- coverage drives/*
 //! cargo run --release -p toponym-server --example drives -- overlap drives/*
+//! cargo run --release -p toponym-server --example drives -- dark --seeds 20
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
 //! shows on buildings not learned from how often fits are true that are called so with some probability.
 //! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
 //! `overlap` learns how places that truly overlap see each other's surfaces and how those do that a false loop
 //! lays over one another (the core's `likelihood.rs`).
+//! `dark` plays the simulator's tours itself and shows what the chain is worth over dark stretches.
 //!
 //! A drive is a folder with `sim.rec` and `truth.json`, as `toponym simulate` makes them. Any log will do:
 //! `toponym-server serve --record` makes the one, `trajectory` rows `[t, x, y, yaw]` are the other.
@@ -18,6 +20,7 @@
 
 mod chance;
 mod coverage;
+mod dark;
 mod drive;
 mod logistic;
 mod overlap;
@@ -55,6 +58,17 @@ enum What {
         #[arg(required = true)]
         drives: Vec<PathBuf>,
     },
+    /// Errors of the chain over dark stretches, and what it claims.
+    Dark {
+        /// Kinds of tours, or how they begin; none: all of them.
+        kinds: Vec<String>,
+        /// How many seeds.
+        #[arg(long, default_value_t = 20)]
+        seeds: u64,
+        /// A line for each stretch, too.
+        #[arg(long)]
+        each: bool,
+    },
 }
 
 fn main() {
@@ -68,5 +82,6 @@ fn main() {
             let drives: Vec<Drive> = drives.iter().map(|d| Drive::read(d)).collect();
             overlap::report(&drives);
         }
+        What::Dark { kinds, seeds, each } => dark::report(&kinds, 1..seeds + 1, each),
     }
 }
