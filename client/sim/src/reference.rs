@@ -34,6 +34,8 @@ mod words;
 #[cfg(test)]
 mod tests;
 
+pub use wheels::motions;
+
 use super::body::STEP_S;
 use super::tours::{Claim, Hypothesis, Piece, Said};
 use super::{Drive, LaserModel, WheelsPrior, World};

@@ -62,7 +62,7 @@ fn at(rows: &[[f64; 4]], stamp_ns: StampNs) -> Pose2 {
 }
 
 /// The mean of poses near each other; at least one.
-fn mean(poses: &[Pose2]) -> Pose2 {
+pub fn mean(poses: &[Pose2]) -> Pose2 {
     let off: Vector3<f64> = poses.iter().map(|p| poses[0].between(p).log()).sum();
     poses[0].compose(&Pose2::exp(&(off / poses.len() as f64)))
 }

@@ -4,10 +4,12 @@
 //! toponym simulate drives/1 --plan PLAN.xml --lidar rplidar --people 4      # and so on
 //! cargo run --release -p toponym-server --example drives -- chance drives/*
 //! cargo run --release -p toponym-server --example drives -- coverage drives/*
+//! cargo run --release -p toponym-server --example drives -- dark --seeds 20
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
 //! shows on buildings not learned from how often fits are true that are called so with some probability.
 //! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
+//! `dark` plays the simulator's tours itself and shows what the chain is worth over dark stretches.
 //!
 //! A drive is a folder with `sim.rec` and `truth.json`, as `toponym simulate` makes them. Any log will do:
 //! `toponym-server serve --record` makes the one, `trajectory` rows `[t, x, y, yaw]` are the other.
@@ -15,6 +17,7 @@
 
 mod chance;
 mod coverage;
+mod dark;
 mod drive;
 mod logistic;
 
@@ -45,6 +48,17 @@ enum What {
         #[arg(required = true)]
         drives: Vec<PathBuf>,
     },
+    /// Errors of the chain over dark stretches, and what it claims.
+    Dark {
+        /// Kinds of tours, or how they begin; none: all of them.
+        kinds: Vec<String>,
+        /// How many seeds.
+        #[arg(long, default_value_t = 20)]
+        seeds: u64,
+        /// A line for each stretch, too.
+        #[arg(long)]
+        each: bool,
+    },
 }
 
 fn main() {
@@ -54,5 +68,6 @@ fn main() {
             chance::report(&drives);
         }
         What::Coverage { drives } => drives.iter().for_each(|d| coverage::report(&Drive::read(d))),
+        What::Dark { kinds, seeds, each } => dark::report(&kinds, 1..seeds + 1, each),
     }
 }

@@ -96,6 +96,24 @@ pub(super) fn links(seen: &Seen<'_>, t_s: f64) -> Links {
     Links { systematic, links }
 }
 
+/// What the wheels tell of the motion over each dark stretch to an observer who knows their noise and has learned
+/// in the light until its end what they always get wrong: the motion, and the covariance of its right perturbation.
+pub fn motions(
+    drive: &Drive,
+    odometry: &Drive,
+    prior: &WheelsPrior,
+    dark: &[Stretch],
+) -> Vec<(Pose, Matrix3<f64>)> {
+    let told = |stretch: &Stretch| {
+        let lit = |k: &usize| !dark.iter().any(|d| d.steps().contains(k));
+        let steps_over = ((stretch.to_s + HAIR_S) / STEP_S) as usize;
+        let known = Systematic::learn(drive, odometry, prior, (0..steps_over).filter(lit));
+        let link = Link::new(drive, odometry, prior, &known.mean, stretch);
+        (link.motion, link.noise + through(&link.by_systematic, &known.covariance))
+    };
+    dark.iter().map(told).collect()
+}
+
 impl Links {
     /// Log density of all the motions that a hypothesis asks for, together: the systematic errors
     /// are the same in all of them, so each stretch, too, teaches what they are, under that

@@ -14,7 +14,7 @@ use crate::scan::align::SIGMA_M;
 use crate::scan::place::Content;
 use crate::scan::sweep::Sweep;
 use crate::track::local::LocalMap;
-use crate::track::wheels::Wheels;
+use crate::track::wheels::{Drift, Wheels};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -120,10 +120,10 @@ pub struct FrontEnd {
     wheels: Wheels,
     /// Distance of what is seen from the local map's surfaces, root mean square.
     rough_m: f64,
-    /// Covariance of the pose in the local map.
-    in_map: Matrix3<f64>,
-    /// Covariance of the pose relative to the last place.
-    since_place: Matrix3<f64>,
+    /// What the pose in the local map is off by.
+    in_map: Drift,
+    /// What the pose relative to the last place is off by.
+    since_place: Drift,
     /// Odometry broke: the next scan begins a new local map.
     broken: bool,
     /// The local map was begun anew: the next place is tied to the last by next to nothing.
@@ -150,8 +150,8 @@ impl FrontEnd {
             path_m: 0.0,
             wheels: Wheels::default(),
             rough_m: SIGMA_M,
-            in_map: Matrix3::zeros(),
-            since_place: Matrix3::zeros(),
+            in_map: Drift::default(),
+            since_place: Drift::default(),
             broken: false,
             fresh: false,
             keys: VecDeque::new(),
@@ -178,7 +178,7 @@ impl FrontEnd {
 
     /// Covariance of the body relative to the place held.
     pub fn since_place(&self) -> Matrix3<f64> {
-        self.since_place
+        self.since_place.covariance(&self.wheels)
     }
 
     /// Takes a scan with the odometry at its stamp.
@@ -244,18 +244,19 @@ impl FrontEnd {
     }
 
     fn predict(&mut self, increment: &Pose2, dt_s: f64) {
-        let (increment, q) = self.wheels.drive(increment, dt_s);
-        let f = increment.inverse().adjoint();
-        self.in_map = f * self.in_map * f.transpose() + q;
-        self.since_place = f * self.since_place * f.transpose() + q;
-        self.front_from_body = self.front_from_body.compose(&increment);
-        self.path_m += increment.x_m.hypot(increment.y_m);
+        let step = self.wheels.drive(increment, dt_s);
+        self.in_map.drive(&step);
+        self.since_place.drive(&step);
+        self.drive_dark(&step);
+        self.front_from_body = self.front_from_body.compose(&step.motion);
+        self.path_m += step.motion.x_m.hypot(step.motion.y_m);
     }
 
     /// Whether the robot drove on blindly until its pose in the local map was too uncertain for a
     /// fit there to be believed.
     fn is_vague(&self) -> bool {
-        let (d2, yaw2) = (self.in_map[(0, 0)].max(self.in_map[(1, 1)]), self.in_map[(2, 2)]);
+        let covariance = self.in_map.covariance(&self.wheels);
+        let (d2, yaw2) = (covariance[(0, 0)].max(covariance[(1, 1)]), covariance[(2, 2)]);
         self.wheels.unseen_m() > VAGUE_PATH_M && (d2 > VAGUE_M.powi(2) || yaw2 > VAGUE_RAD.powi(2))
     }
 
@@ -265,7 +266,7 @@ impl FrontEnd {
         self.keys.clear();
         self.local = None;
         self.path_m += 2.0 * LOCAL_PATH_M;
-        self.in_map = Matrix3::zeros();
+        self.in_map = Drift::default();
         self.wheels.lift();
     }
 
@@ -276,7 +277,7 @@ impl FrontEnd {
         let frozen = self.freeze(f64::INFINITY);
         self.fresh = true;
         self.clear_local();
-        self.since_place = Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0));
+        self.since_place = Drift::of(Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0)));
         frozen
     }
 
@@ -291,7 +292,10 @@ impl FrontEnd {
         self.newest_place = self.front_from_body;
         let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
         let bend = Matrix3::from_diagonal(&BEND.component_mul(&BEND)) * ((1.0 + d_m) * self.rough_m.powi(2));
-        let information = (self.since_place + bend).try_inverse().unwrap_or_else(Matrix3::identity);
+        let in_the_dark = self.ends_in_the_dark(self.next_place);
+        // Systematic errors in the dark add up over all of it, and are dealt out once it is over.
+        let driven = if in_the_dark { self.since_place.noise } else { self.since_place() };
+        let information = (driven + bend).try_inverse().unwrap_or_else(Matrix3::identity);
         let chain = Chain { previous_from_this, information, broken, failed: FAILED_MIN };
         self.open.push_back(OpenPlace {
             id: self.next_place,
@@ -301,7 +305,10 @@ impl FrontEnd {
             chain,
         });
         self.next_place += 1;
-        self.since_place = Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-6, 1e-7));
+        self.since_place = Drift::of(Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-6, 1e-7)));
+        if in_the_dark {
+            self.deal_out(driven + bend);
+        }
         true
     }
 

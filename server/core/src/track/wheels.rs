@@ -1,183 +1,199 @@
 //! Online calibration of wheel odometry, and what its increments are worth.
 //!
 //! While the laser sees, the motion that registration found over some decimetres of path tells what
-//! odometry got wrong. Three systematic errors are estimated by a Kalman filter,
+//! odometry got wrong. Three systematic errors θ = (s, t, b) are estimated by a Kalman filter,
 //!
 //! ```text
-//! d  = (1 + s) d_odom                    s: scale (tyres' pressure)
-//! ψ  = (1 + k) ψ_odom + b d_odom         k: scale of turns (track width), b: unequal wheels
+//! d_odom = (1 + s) d                s: scale (tyres' pressure)
+//! ψ_odom = (1 + t) ψ + b d          t: scale of turns (track width), b: unequal wheels
 //! ```
 //!
-//! and what they leave over is noise that grows with path and turning, as a random walk:
-//! `σ_d² = f_d (q_d d + q_dψ |ψ|)`, `σ_ψ² = f_ψ (q_ψd d + q_ψ |ψ|)`. The factors f are learned from the
-//! innovations, so that a blind stretch is bridged with a covariance that fits this robot. A slip has
-//! a heavy tail: it counts with the weight of a Student distribution.
+//! by regression of odometry on the motion seen and not the other way round: where what one regresses
+//! on is noisy, slopes come out too small. What they leave over is noise that grows with path and
+//! turning, as a random walk ([`noise`]). A slip has a heavy tail: it counts with the weight of a
+//! Student distribution.
+//!
+//! Noise adds up as variances do, systematic errors as errors do: over a stretch in which nothing is
+//! seen a pose is off by `e = G (θ − θ̂) + noise`, and a [`Drift`] carries both parts along.
 
+mod noise;
+
+use self::noise::{First, Look, Noise};
 use crate::geometry::{Pose2, wrap};
-use nalgebra::{Matrix2, Matrix3, Vector2, Vector3};
+use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
-/// Variance per metre of path, and per radian turned, that a robot is thought to have at first: 4 cm
+/// Noise of the distance and of the yaw that a robot is thought to have at first: in the mean, some 4 cm
 /// and 2° after a metre, 3 cm and 3° after a radian.
-const D_PER_M: f64 = 0.04 * 0.04;
-const D_PER_RAD: f64 = 0.03 * 0.03;
-const YAW_PER_M: f64 = 0.035 * 0.035;
-const YAW_PER_RAD: f64 = 0.05 * 0.05;
+const DISTANCE: First = First { per_m: 9e-4, per_rad: 3e-4, wild: 0.3 };
+const YAW: First = First { per_m: 6e-4, per_rad: 1.2e-3, wild: 0.3 };
 /// Variance per second at rest: encoders tick, floors shake.
 const D_PER_S: f64 = 1e-6;
 const YAW_PER_S: f64 = 2.5e-7;
-/// Systematic errors thought possible at first, one standard deviation.
-const SCALE_SIGMA: f64 = 0.05;
-const BEND_SIGMA_RAD_PER_M: f64 = 0.02;
-const TURN_SIGMA: f64 = 0.05;
-/// They wander by so much over 100 m or 100 rad.
-const SCALE_WANDER: f64 = 0.005;
-const BEND_WANDER_RAD_PER_M: f64 = 0.002;
-const TURN_WANDER: f64 = 0.01;
+/// Systematic errors (s, t, b) thought possible at first, one standard deviation.
+const ERRORS: Vector3<f64> = Vector3::new(0.05, 0.05, 0.02);
+/// They wander by so much over 100 m, 100 rad and 100 m.
+const WANDER: Vector3<f64> = Vector3::new(0.002, 0.003, 0.0005);
 /// No wheels are worse; what seems worse is a slip or a false fit.
-const SCALE_MAX: f64 = 0.25;
-const BEND_MAX_RAD_PER_M: f64 = 0.15;
-const TURN_MAX: f64 = 0.25;
-/// Motion that is compared with registration at a time.
-const WINDOW_M: f64 = 0.5;
-const WINDOW_RAD: f64 = 0.5;
+const ERRORS_MAX: Vector3<f64> = Vector3::new(0.25, 0.25, 0.15);
+/// Motion that is compared with registration at a time, metres of path plus radians turned: windows of
+/// different lengths tell noise, which grows with them, from what registration is off by, which does not.
+const WINDOWS: [f64; 3] = [0.4, 0.8, 1.6];
 /// Longer ones had a blind stretch in them.
-const WINDOW_MAX_M: f64 = 3.0;
+const WINDOW_MAX: f64 = 4.0;
 /// Degrees of freedom of the heavy tail.
 const TAIL: f64 = 4.0;
-/// Windows that the first guess of the noise counts for, and those remembered.
-const NOISE_PRIOR: f64 = 6.0;
-const NOISE_KEPT: f64 = 80.0;
-const NOISE_MIN: f64 = 0.01;
-const NOISE_MAX: f64 = 30.0;
 
-/// A factor on a variance, learned from innovations.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-struct Noise {
-    factor: f64,
-    weight: f64,
+/// What an increment of odometry says.
+#[derive(Clone, Debug)]
+pub struct Step {
+    /// The motion, calibrated.
+    pub motion: Pose2,
+    /// Covariance of its error by noise, right perturbation.
+    noise: Matrix3<f64>,
+    /// Its error per systematic error.
+    by_errors: Matrix3<f64>,
 }
 
-impl Noise {
-    const FIRST: Self = Self { factor: 1.0, weight: NOISE_PRIOR };
+/// What a pose that is told by wheels alone is off by, right perturbation.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Drift {
+    /// Covariance by noise.
+    pub noise: Matrix3<f64>,
+    /// G, its error per systematic error.
+    pub by_errors: Matrix3<f64>,
+}
 
-    /// Takes a squared innovation of which `own` is this noise's variance without the factor and
-    /// `other` that of everything else.
-    fn learn(&mut self, squared: f64, own: f64, other: f64) {
-        let mine = self.factor * own;
-        // What else is uncertain hides this noise.
-        let weight = (mine / (mine + other)).powi(2);
-        let seen = (squared - other).clamp(0.0, 9.0 * (mine + other)) / own.max(1e-12);
-        self.weight = (self.weight + weight).min(NOISE_KEPT);
-        self.factor += (seen - self.factor) * weight / self.weight;
-        self.factor = self.factor.clamp(NOISE_MIN, NOISE_MAX);
+impl Drift {
+    /// By noise alone.
+    pub fn of(noise: Matrix3<f64>) -> Self {
+        Self { noise, by_errors: Matrix3::zeros() }
+    }
+
+    /// One step on.
+    pub fn drive(&mut self, step: &Step) {
+        let over = step.motion.inverse().adjoint();
+        self.noise = over * self.noise * over.transpose() + step.noise;
+        self.by_errors = over * self.by_errors + step.by_errors;
+    }
+
+    /// What the systematic errors make of it.
+    pub fn systematic(&self, wheels: &Wheels) -> Matrix3<f64> {
+        self.by_errors * wheels.covariance * self.by_errors.transpose()
+    }
+
+    /// All of it.
+    pub fn covariance(&self, wheels: &Wheels) -> Matrix3<f64> {
+        self.noise + self.systematic(wheels)
     }
 }
 
-/// Motion since the scans last told the pose, or since a window began.
+/// Motion since a window began.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Run {
-    /// Calibrated odometry.
+    /// As odometry has it.
     pose: Pose2,
-    /// Signed distance and turn.
-    forward_m: f64,
-    turn_rad: f64,
     /// Lengths, whatever the sign.
     path_m: f64,
     turned_rad: f64,
 }
 
 impl Run {
-    fn add(&mut self, increment: &Pose2, calibrated: &Pose2) {
-        self.pose = self.pose.compose(calibrated);
-        self.forward_m += increment.x_m;
-        self.turn_rad += wrap(increment.yaw_rad);
+    fn add(&mut self, increment: &Pose2) {
+        self.pose = self.pose.compose(increment);
         self.path_m += increment.x_m.hypot(increment.y_m);
         self.turned_rad += wrap(increment.yaw_rad).abs();
+    }
+
+    fn length(&self) -> f64 {
+        self.path_m + self.turned_rad
     }
 }
 
 /// What is known of a robot's wheels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Wheels {
-    scale: f64,
-    scale_variance: f64,
-    /// b and k.
-    bend: Vector2<f64>,
-    bend_covariance: Matrix2<f64>,
-    noise_d: Noise,
-    noise_yaw: Noise,
-    /// Since the scans last told the pose.
-    unseen: Run,
+    /// (s, t, b).
+    errors: Vector3<f64>,
+    covariance: Matrix3<f64>,
+    distance: Noise,
+    yaw: Noise,
+    /// Path and turning since the scans last told the pose.
+    unseen_m: f64,
+    unseen_rad: f64,
     /// Since this pose, known with this covariance, was told.
     window: Option<(Pose2, Matrix3<f64>)>,
     run: Run,
+    windows: usize,
 }
 
 impl Default for Wheels {
     fn default() -> Self {
         Self {
-            scale: 0.0,
-            scale_variance: SCALE_SIGMA.powi(2),
-            bend: Vector2::zeros(),
-            bend_covariance: Matrix2::from_diagonal(&Vector2::new(
-                BEND_SIGMA_RAD_PER_M.powi(2),
-                TURN_SIGMA.powi(2),
-            )),
-            noise_d: Noise::FIRST,
-            noise_yaw: Noise::FIRST,
-            unseen: Run::default(),
+            errors: Vector3::zeros(),
+            covariance: Matrix3::from_diagonal(&ERRORS.component_mul(&ERRORS)),
+            distance: Noise::new(DISTANCE),
+            yaw: Noise::new(YAW),
+            unseen_m: 0.0,
+            unseen_rad: 0.0,
             window: None,
             run: Run::default(),
+            windows: 0,
         }
     }
 }
 
 impl Wheels {
-    /// An increment of odometry, calibrated, and the covariance (right perturbation) that it adds.
-    pub fn drive(&mut self, increment: &Pose2, dt_s: f64) -> (Pose2, Matrix3<f64>) {
-        let (forward_m, turn_rad) = (increment.x_m, wrap(increment.yaw_rad));
-        let calibrated = Pose2::new(
-            increment.x_m * (1.0 + self.scale),
-            increment.y_m * (1.0 + self.scale),
-            turn_rad + self.bend.x * forward_m + self.bend.y * turn_rad,
-        );
+    /// Takes an increment of odometry.
+    pub fn drive(&mut self, increment: &Pose2, dt_s: f64) -> Step {
         let mut run = Run::default();
-        run.add(increment, &calibrated);
-        // Systematic errors add up, not their squares: what they add to the variance grows with the
-        // motion since the last look.
-        let before = Vector2::new(self.unseen.forward_m, self.unseen.turn_rad);
-        let after = before + Vector2::new(forward_m, turn_rad);
-        let of_bend = |v: &Vector2<f64>| (v.transpose() * self.bend_covariance * v).x;
-        let grown_d = self.scale_variance * (after.x * after.x - before.x * before.x).max(0.0);
-        let grown_yaw = (of_bend(&after) - of_bend(&before)).max(0.0);
-        let d = self.noise_d.factor * variance_d(&run) + D_PER_S * dt_s + 1e-10;
-        let yaw = self.noise_yaw.factor * variance_yaw(&run) + YAW_PER_S * dt_s + 1e-11 + grown_yaw;
-        self.unseen.add(increment, &calibrated);
-        self.run.add(increment, &calibrated);
-        (calibrated, Matrix3::from_diagonal(&Vector3::new(d + grown_d, d, yaw)))
+        run.add(increment);
+        self.run.add(increment);
+        self.unseen_m += run.path_m;
+        self.unseen_rad += run.turned_rad;
+        let (ahead, turn) = (1.0 + self.errors.x, 1.0 + self.errors.y);
+        let (x_m, y_m) = (increment.x_m / ahead, increment.y_m / ahead);
+        let yaw_rad = (wrap(increment.yaw_rad) - self.errors.z * x_m) / turn;
+        let d = self.distance.variance(run.path_m, run.turned_rad) + D_PER_S * dt_s + 1e-10;
+        let yaw = self.yaw.variance(run.path_m, run.turned_rad) + YAW_PER_S * dt_s + 1e-11;
+        // Of the coordinates of the step, as seen at its end.
+        let turned = Pose2::new(0.0, 0.0, -yaw_rad).adjoint();
+        let noise = Matrix3::from_diagonal(&Vector3::new(d, d, yaw));
+        #[rustfmt::skip]
+        let by_errors = Matrix3::new(
+            -x_m / ahead, 0.0,             0.0,
+            -y_m / ahead, 0.0,             0.0,
+            0.0,          -yaw_rad / turn, -x_m / turn,
+        );
+        Step {
+            motion: Pose2::new(x_m, y_m, yaw_rad),
+            noise: turned * noise * turned.transpose(),
+            by_errors: turned * by_errors,
+        }
     }
 
     /// Path since the scans last told the pose.
     pub fn unseen_m(&self) -> f64 {
-        self.unseen.path_m
+        self.unseen_m
     }
 
     /// How much the robot turned, to either side, since the scans last told the pose.
     pub fn unseen_rad(&self) -> f64 {
-        self.unseen.turned_rad
+        self.unseen_rad
     }
 
     /// The scans told the pose: learns from the motion since a while ago.
     pub fn told(&mut self, map_from_body: &Pose2, covariance: &Matrix3<f64>) {
-        self.unseen = Run::default();
-        let long = self.run.path_m >= WINDOW_M || self.run.turned_rad >= WINDOW_RAD;
+        (self.unseen_m, self.unseen_rad) = (0.0, 0.0);
         if let Some((from, from_covariance)) = self.window {
-            if !long {
+            if self.run.length() < WINDOWS[self.windows % WINDOWS.len()] {
                 return;
             }
-            if self.run.path_m <= WINDOW_MAX_M {
-                self.learn(&from.between(map_from_body), &(from_covariance + covariance));
+            if self.run.length() <= WINDOW_MAX {
+                let moved = from.between(map_from_body);
+                let over = moved.inverse().adjoint();
+                self.learn(&moved, &(over * from_covariance * over.transpose() + covariance));
+                self.windows += 1;
             }
         }
         self.window = Some((*map_from_body, *covariance));
@@ -186,52 +202,51 @@ impl Wheels {
 
     /// The pose has no more to do with the one before.
     pub fn lift(&mut self) {
-        self.unseen = Run::default();
+        (self.unseen_m, self.unseen_rad) = (0.0, 0.0);
         self.window = None;
         self.run = Run::default();
     }
 
     fn learn(&mut self, moved: &Pose2, fixes: &Matrix3<f64>) {
         let run = self.run;
-        let off = run.pose.between(moved).log();
-        // Scale.
-        let (own, fix) = (variance_d(&run), fixes[(0, 0)].max(fixes[(1, 1)]));
-        self.scale_variance += SCALE_WANDER.powi(2) * run.path_m / 100.0;
-        let known = self.scale_variance * run.forward_m.powi(2);
-        let noise = self.noise_d.factor * own + fix;
-        let spread = known + noise / weight(off.x * off.x / (known + noise));
-        self.noise_d.learn(f64::midpoint(off.x * off.x, off.y * off.y), own, known / 2.0 + fix);
-        let gain = self.scale_variance * run.forward_m / spread;
-        self.scale = (self.scale + gain * off.x).clamp(-SCALE_MAX, SCALE_MAX);
-        self.scale_variance *= 1.0 - gain * run.forward_m;
-        // Yaw.
-        let (own, fix) = (variance_yaw(&run), fixes[(2, 2)]);
-        self.bend_covariance[(0, 0)] += BEND_WANDER_RAD_PER_M.powi(2) * run.path_m / 100.0;
-        self.bend_covariance[(1, 1)] += TURN_WANDER.powi(2) * run.turned_rad / 100.0;
-        let h = Vector2::new(run.forward_m, run.turn_rad);
-        let ph = self.bend_covariance * h;
-        let known = h.dot(&ph);
-        let noise = self.noise_yaw.factor * own + fix;
-        let spread = known + noise / weight(off.z * off.z / (known + noise));
-        self.noise_yaw.learn(off.z * off.z, own, known + fix);
-        self.bend += ph * (off.z / spread);
-        self.bend.x = self.bend.x.clamp(-BEND_MAX_RAD_PER_M, BEND_MAX_RAD_PER_M);
-        self.bend.y = self.bend.y.clamp(-TURN_MAX, TURN_MAX);
-        self.bend_covariance -= ph * ph.transpose() / spread;
+        let wandered = WANDER.component_mul(&WANDER) / 100.0;
+        self.covariance +=
+            Matrix3::from_diagonal(&wandered.component_mul(&Vector3::new(run.path_m, run.turned_rad, run.path_m)));
+        let (seen, measured) = (moved.log(), run.pose.log());
+        let (ahead, turn) = (Vector3::new(seen.x, 0.0, 0.0), Vector3::new(0.0, seen.z, seen.x));
+        let off = measured - seen;
+        let look = |off: f64, row: &Vector3<f64>, fix: f64, wheels: &Self| Look {
+            squared: (off - row.dot(&wheels.errors)).powi(2),
+            path_m: run.path_m,
+            turned_rad: run.turned_rad,
+            fix,
+            known: row.dot(&(wheels.covariance * row)),
+        };
+        let distance = look(off.x, &ahead, fixes[(0, 0)], self);
+        self.distance.learn(&distance);
+        let noise = self.distance.variance(run.path_m, run.turned_rad) + self.distance.fix() * fixes[(0, 0)];
+        self.regress(&ahead, off.x, noise);
+        let yaw = look(off.z, &turn, fixes[(2, 2)], self);
+        self.yaw.learn(&yaw);
+        let noise = self.yaw.variance(run.path_m, run.turned_rad) + self.yaw.fix() * fixes[(2, 2)];
+        self.regress(&turn, off.z, noise);
+    }
+
+    /// Kalman's update of the systematic errors: `off = row · θ` and noise.
+    fn regress(&mut self, row: &Vector3<f64>, off: f64, noise: f64) {
+        let surprise = off - row.dot(&self.errors);
+        let pulled = self.covariance * row;
+        let known = row.dot(&pulled);
+        let spread = known + noise / weight(surprise * surprise / (known + noise));
+        self.errors += pulled * (surprise / spread);
+        self.errors = self.errors.sup(&-ERRORS_MAX).inf(&ERRORS_MAX);
+        self.covariance -= pulled * pulled.transpose() / spread;
     }
 }
 
 /// Weight of an innovation by its Mahalanobis distance²: none of a slip is believed.
 fn weight(distance2: f64) -> f64 {
     ((TAIL + 1.0) / (TAIL + distance2)).min(1.0)
-}
-
-fn variance_d(run: &Run) -> f64 {
-    D_PER_M * run.path_m + D_PER_RAD * run.turned_rad
-}
-
-fn variance_yaw(run: &Run) -> f64 {
-    YAW_PER_M * run.path_m + YAW_PER_RAD * run.turned_rad
 }
 
 #[cfg(test)]
@@ -260,7 +275,7 @@ mod tests {
         steps: std::ops::Range<u64>,
         blind: bool,
     ) -> (Pose2, Pose2, Matrix3<f64>) {
-        let (mut truth, mut made, mut covariance) = (Pose2::default(), Pose2::default(), Matrix3::zeros());
+        let (mut truth, mut made, mut drift) = (Pose2::default(), Pose2::default(), Drift::default());
         let told = Matrix3::from_diagonal(&Vector3::new(2.5e-5, 2.5e-5, 3e-6));
         for k in steps {
             let step = Pose2::new(0.1, 0.0, 0.05 * (k as f64 * 0.01).sin());
@@ -270,17 +285,16 @@ mod tests {
                 0.0,
                 step.yaw_rad - robot.bend_rad_per_m * 0.1 + robot.noise_rad * root * gauss(k, 1),
             );
-            let (increment, q) = wheels.drive(&odometry, 0.1);
-            let f = increment.inverse().adjoint();
-            covariance = f * covariance * f.transpose() + q;
+            let driven = wheels.drive(&odometry, 0.1);
+            drift.drive(&driven);
             truth = truth.compose(&step);
-            made = made.compose(&increment);
+            made = made.compose(&driven.motion);
             if !blind {
                 let off = Vector3::new(0.005 * gauss(k, 2), 0.005 * gauss(k, 3), 0.0017 * gauss(k, 4));
                 wheels.told(&truth.compose(&Pose2::exp(&off)), &told);
             }
         }
-        (truth, made, covariance)
+        (truth, made, drift.covariance(wheels))
     }
 
     #[test]
@@ -327,7 +341,8 @@ mod tests {
         }
         let here = before.window.map_or(Pose2::default(), |w| w.0);
         wheels.told(&here, &(Matrix3::identity() * 1e-5));
-        assert!((wheels.scale - before.scale).abs() < 0.02, "{} after {}", wheels.scale, before.scale);
+        let off = wheels.errors - before.errors;
+        assert!(off.x.abs() < 0.02 && off.y.abs() < 0.01 && off.z.abs() < 0.005, "{off}");
     }
 
     #[test]
@@ -335,12 +350,12 @@ mod tests {
         let mut wheels = Wheels::default();
         let mut sum = Matrix3::zeros();
         for _ in 0..600 {
-            let (increment, q) = wheels.drive(&Pose2::default(), 0.1);
-            assert_eq!(increment, Pose2::default());
-            sum += q;
+            let step = wheels.drive(&Pose2::default(), 0.1);
+            assert_eq!(step.motion, Pose2::default());
+            sum += step.noise;
             wheels.told(&Pose2::default(), &(Matrix3::identity() * 1e-6));
         }
         assert!(sum[(0, 0)].sqrt() < 0.02 && sum[(2, 2)].sqrt() < 0.01);
-        assert_eq!((wheels.scale, wheels.noise_yaw), (0.0, Noise::FIRST));
+        assert_eq!((wheels.errors, wheels.yaw), (Vector3::zeros(), Noise::new(YAW)));
     }
 }

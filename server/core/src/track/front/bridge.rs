@@ -2,13 +2,20 @@
 //!
 //! When the laser sees again, the pose in the old local map is vague, and a scan laid on it there
 //! would be taken for the truth. So a new local map begins, and for its first metres it is matched
-//! with the old one as a whole, as places are. What fits within what odometry allows corrects the
-//! places of the dark like a smoother: with cumulative covariance `P_i` of the i-th, `P_n` of the
+//! with the old one as a whole, as places are. That is only done over a gap so short that nothing else can
+//! fit within what odometry allows; beyond, a look-alike might, and it takes loops, which weigh their rivals,
+//! to find out. What fits corrects the places of the dark like a smoother: with cumulative covariance `P_i` of the i-th, `P_n` of the
 //! first in the light, and `F_i` from the one's perturbation to the other's,
 //!
 //! ```text
 //! δ_i = P_i F_iᵀ (P_n + R)⁻¹ e,    e = log(predicted⁻¹ · found)
 //! ```
+//!
+//! Edges of the chain add up as if each were off by itself. Wheels' systematic errors θ are the same in all of
+//! them: over a stretch they put the end off by G θ, whose covariance is more than the sum of each
+//! edge's own (or less, there and back). So each edge of n gets its noise and a share of that, carried back to
+//! it: composed, the chain then has the covariance of its end as it is. Shares grow along the stretch as what
+//! they stand for does, with the square of the path.
 
 use crate::edge::PlaceId;
 use crate::geometry::Pose2;
@@ -16,9 +23,14 @@ use crate::scan::cloud::{Index, Surfaces};
 use crate::scan::matching::{Mode, index, refine};
 use crate::scan::place::Content;
 use crate::track::front::{Chain, FrontEnd, OpenPlace, content};
+use crate::track::wheels::{Drift, Step};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 
+/// A prediction off by more, one standard deviation in any direction, is tied to nothing: rooms that are alike
+/// stand 3 m apart, and what is allowed reaches 3.4 standard deviations to either side.
+const TIE_M: f64 = 0.45;
+const TIE_RAD: f64 = 0.2;
 /// The new local map is matched with the old one while it is no longer than this.
 const TRY_PATH_M: f64 = 8.0;
 /// Fits below are no fits.
@@ -40,7 +52,7 @@ const GUESSES: usize = 12;
 const LOOKED_UP: usize = 100;
 const LAID_ON_M: f32 = 0.4;
 /// More places are not held back.
-const HELD_BACK_MAX: usize = 80;
+const HELD_BACK_MAX: usize = 1000;
 
 /// A blind stretch that is not dealt with yet: its places are held back.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -48,6 +60,10 @@ pub(crate) struct Dark {
     /// The last place before it.
     last: PlaceId,
     front_from_last: Pose2,
+    /// What the pose relative to it is off by.
+    drift: Drift,
+    /// Covariance by noise of each edge from there on, up to the first place in the light.
+    edges: Vec<Matrix3<f64>>,
     /// Once the laser sees again.
     landed: Option<Landed>,
 }
@@ -66,6 +82,8 @@ impl FrontEnd {
         self.dark = self.open.back().filter(|_| !self.keys.is_empty()).map(|last| Dark {
             last: last.id,
             front_from_last: last.front_from_place,
+            drift: self.since_place,
+            edges: Vec::new(),
             landed: None,
         });
     }
@@ -73,6 +91,37 @@ impl FrontEnd {
     /// Whether the laser has seen nothing since a blind stretch began.
     pub(crate) fn is_dark(&self) -> bool {
         self.dark.as_ref().is_some_and(|d| d.landed.is_none())
+    }
+
+    /// Whether a place that begins is one of the dark, or the first in the light.
+    pub(crate) fn ends_in_the_dark(&self, place: PlaceId) -> bool {
+        self.dark.as_ref().is_some_and(|d| d.landed.as_ref().is_none_or(|l| l.place == place))
+    }
+
+    /// The robot drives on.
+    pub(crate) fn drive_dark(&mut self, step: &Step) {
+        if let Some(dark) = self.dark.as_mut().filter(|d| d.landed.is_none()) {
+            dark.drift.drive(step);
+        }
+    }
+
+    /// Another place began, at the end of an edge with such noise: deals out what the systematic errors
+    /// make of the whole stretch.
+    pub(crate) fn deal_out(&mut self, noise: Matrix3<f64>) {
+        let Some(dark) = &mut self.dark else { return };
+        dark.edges.push(noise);
+        let systematic = dark.drift.systematic(&self.wheels);
+        let (last, here, n) = (dark.last, self.front_from_body, dark.edges.len() as f64);
+        for place in self.open.iter_mut().filter(|p| p.id > last) {
+            let k = place.id - last;
+            let Some(noise) = dark.edges.get(k as usize - 1) else { continue };
+            let share = (2.0 * k as f64 - 1.0) / (n * n);
+            let back = place.front_from_place.between(&here).adjoint();
+            let covariance = noise + back * systematic * back.transpose() * share;
+            if let Some(information) = covariance.try_inverse() {
+                place.chain.information = (information + information.transpose()) * 0.5;
+            }
+        }
     }
 
     /// Whether a place must not be frozen yet.
@@ -96,7 +145,7 @@ impl FrontEnd {
 
     /// Tries to tie the new local map to the old one.
     pub(crate) fn bridge(&mut self) {
-        let Some(Dark { last, front_from_last, landed: Some(landed) }) = &self.dark else { return };
+        let Some(Dark { last, front_from_last, landed: Some(landed), .. }) = &self.dark else { return };
         let (last, n) = (*last, landed.place);
         let held: Vec<&OpenPlace> = self.open.iter().filter(|p| p.id > last && p.id <= n).collect();
         let Some(first) = held.last().filter(|p| p.id == n) else {
@@ -105,6 +154,10 @@ impl FrontEnd {
         };
         let covariances = cumulative(&held);
         let Some(p_n) = covariances.last() else { return };
+        if !is_short(p_n) {
+            self.dark = None;
+            return;
+        }
         let found = tie(&landed.shore, &content(self.keys.iter(), &first.front_from_place), p_n);
         if let Some(mode) = found {
             let corrected = smooth(&held, &covariances, p_n, &mode);
@@ -159,6 +212,12 @@ fn cumulative(places: &[&OpenPlace]) -> Vec<Matrix3<f64>> {
             p
         })
         .collect()
+}
+
+/// Whether a prediction with such a covariance leaves room for one fit only.
+fn is_short(covariance: &Matrix3<f64>) -> bool {
+    let far = covariance.fixed_view::<2, 2>(0, 0).symmetric_eigenvalues().max();
+    far < TIE_M.powi(2) && covariance[(2, 2)] < TIE_RAD.powi(2)
 }
 
 /// Where the new local map fits the old one, both in the predicted frame of the first place in the

@@ -6,6 +6,7 @@ use crate::scan::cloud::{Point, thin};
 use crate::scan::place::VOXEL_M;
 use crate::scan::sweep::Sweep;
 use crate::track::front::FrontEnd;
+use crate::track::wheels::Drift;
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest distance between a point and its surface when registration begins.
@@ -35,7 +36,8 @@ const LOOK_PATH_PER_RAD_M: f64 = 2.0;
 impl FrontEnd {
     /// Registers the scan to the local map around the prediction; what it says is fused.
     pub(crate) fn correct(&mut self, sweep: &Sweep) {
-        let Some(information) = self.in_map.try_inverse() else { return };
+        let predicted = self.in_map.covariance(&self.wheels);
+        let Some(information) = predicted.try_inverse() else { return };
         let prior = Prior {
             target_from_source: self.front_from_body,
             information: information * ODOMETRY_TRUST,
@@ -54,10 +56,12 @@ impl FrontEnd {
         let fuse = |p: &Matrix3<f64>, look: Matrix3<f64>| -> Option<Matrix3<f64>> {
             (p.try_inverse()? + look).try_inverse().map(|m| (m + m.transpose()) * 0.5)
         };
-        self.in_map = fuse(&self.in_map, look).map_or(self.in_map, |m| m + map);
+        let in_map = fuse(&predicted, look).map_or(predicted, |m| m + map);
+        self.in_map = Drift::of(in_map);
         let news = (moved_m / LOOK_PATH_M).min(1.0);
-        self.since_place = fuse(&self.since_place, look * news).unwrap_or(self.since_place);
-        self.wheels.told(&self.front_from_body, &self.in_map);
+        let since_place = self.since_place();
+        self.since_place = Drift::of(fuse(&since_place, look * news).unwrap_or(since_place));
+        self.wheels.told(&self.front_from_body, &in_map);
     }
 
     fn register(&mut self, points: &[Point], prior: &Prior) -> Option<Alignment> {
