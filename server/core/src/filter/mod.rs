@@ -8,12 +8,14 @@ pub mod decide;
 pub mod labels;
 pub mod likelihood;
 pub mod loops;
+pub mod naming;
 pub mod particle;
 pub mod propose;
 pub mod resample;
 pub mod revisit;
 pub(crate) mod second_look;
 pub mod weigh;
+pub mod words;
 
 use crate::config::Config;
 use crate::edge::{EdgeKind, Proposal, Vertex};

@@ -33,9 +33,6 @@ pub struct Edge {
     pub factor: FactorId,
 }
 
-/// Sentences whose share in the weight can be taken back.
-const SAID_MAX: usize = 64;
-
 /// Equal particles.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Particle {
@@ -49,8 +46,8 @@ pub struct Particle {
     pub belief: Belief,
     /// L.
     pub labels: Labels,
-    /// What the newest sentences added to log w, by utterance: to take them back.
-    pub said: Arc<Vec<(u32, f64)>>,
+    /// The words' share in log w, when they were last asked: see [`crate::filter::words`].
+    pub log_words: f64,
     /// log w of all of them together; normalised after each step.
     pub log_weight: f64,
     /// How many they are.
@@ -68,7 +65,7 @@ impl Particle {
             refused: Vec::new(),
             belief: Belief::new(),
             labels: Labels::default(),
-            said: Arc::default(),
+            log_words: 0.0,
             log_weight: 0.0,
             count,
             kept_until: 0,
@@ -115,28 +112,6 @@ impl Particle {
         Ok(())
     }
 
-    /// Weighs by what a sentence says for or against this graph; see [`crate::talk::predictive`].
-    pub fn weigh_by_words(&mut self, utterance: u32, log_ratio: f64) {
-        self.log_weight += log_ratio;
-        let said = Arc::make_mut(&mut self.said);
-        match said.iter_mut().find(|(u, _)| *u == utterance) {
-            Some((_, sum)) => *sum += log_ratio,
-            None => said.push((utterance, log_ratio)),
-        }
-        if said.len() > SAID_MAX {
-            said.remove(0);
-        }
-    }
-
-    /// Takes back what an utterance put into labels and weight. For the edges that it proposed see
-    /// [`crate::filter::second_look`].
-    pub fn revoke(&mut self, utterance: u32) {
-        self.labels.revoke(utterance);
-        if let Some(at) = self.said.iter().position(|(u, _)| *u == utterance) {
-            self.log_weight -= Arc::make_mut(&mut self.said).remove(at).1;
-        }
-    }
-
     /// w of all of them together.
     pub fn weight(&self) -> f64 {
         self.log_weight.exp()
@@ -172,17 +147,5 @@ mod tests {
         assert_eq!(p.taken[..], [2, 4]);
         p.give_up(|e| e.revisit == 4);
         assert_eq!(p.taken[..], [2]);
-    }
-
-    #[test]
-    fn a_sentence_taken_back_takes_its_weight_along_and_no_other() {
-        let mut p = Particle::empty(1);
-        for (utterance, log_ratio) in [(0, -0.5), (1, 0.25), (0, -0.25)] {
-            p.weigh_by_words(utterance, log_ratio);
-        }
-        p.revoke(0);
-        assert!((p.log_weight - 0.25).abs() < 1e-12);
-        p.revoke(0);
-        assert!((p.log_weight - 0.25).abs() < 1e-12, "once");
     }
 }

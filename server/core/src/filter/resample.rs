@@ -8,7 +8,6 @@ use crate::edge::Vertex;
 use crate::filter::particle::Particle;
 use crate::random::{Purpose, generator};
 use rand::RngExt;
-use std::sync::Arc;
 
 /// Lighter ones are left to the draw: hardly ever does one become likely again.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -77,8 +76,6 @@ pub fn resample(particles: Vec<Particle>, n: u32, seed: u64, t: Vertex) -> Vec<P
         if offset < 0.0 {
             offset += unit;
             p.log_weight = unit.ln();
-            // What sentences said for or against it is used up by the draw.
-            p.said = Arc::default();
             p.count = 1;
             kept.push(p);
         }
@@ -116,6 +113,7 @@ mod tests {
     use crate::edge::EdgeKind;
     use crate::filter::particle::Edge;
     use crate::geometry::Pose2;
+    use std::sync::Arc;
 
     /// Particles with the given weights and counts, each of a graph of its own.
     fn particles(weights: &[(f64, u32)]) -> Vec<Particle> {
@@ -144,20 +142,6 @@ mod tests {
 
     fn total(particles: &[Particle]) -> (f64, u32) {
         (particles.iter().map(Particle::weight).sum(), particles.iter().map(|p| p.count).sum())
-    }
-
-    #[test]
-    fn a_drawn_particle_has_no_words_left_to_take_back() {
-        let mut all = particles(&[(0.98, 29), (0.02, 1)]);
-        for p in &mut all {
-            p.weigh_by_words(7, -1e-9);
-        }
-        for seed in 0..50 {
-            for p in resample(all.clone(), 30, seed, 0) {
-                // The heavy one kept its weight, and with it what the sentence put there.
-                assert_eq!(p.said.is_empty(), p.weight() < 0.5);
-            }
-        }
     }
 
     #[test]

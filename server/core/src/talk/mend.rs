@@ -43,11 +43,11 @@ pub(crate) fn strike(talk: &mut Talk, filter: &mut Filter, number: u32) -> usize
     let led = filter.led_by_names();
     Arc::make_mut(&mut talk.ledger).strike(number);
     for p in &mut filter.particles {
-        p.revoke(number);
+        p.labels.revoke(number);
     }
     resolve(talk, filter);
     let given_up = filter.judge_again(led);
-    filter.rank();
+    filter.weigh_words(talk);
     given_up
 }
 
