@@ -140,8 +140,6 @@ pub fn born(
         return None;
     }
     // What was said before counts for the floors that are one by now.
-    let log_words = words.log_likelihood(&p);
-    p.log_weight += log_words - p.log_words;
-    p.log_words = log_words;
+    p.weigh_words(words);
     Some(p)
 }

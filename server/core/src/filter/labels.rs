@@ -97,6 +97,8 @@ impl Support {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Labels {
     evidence: Arc<Vec<Evidence>>,
+    /// By utterance and figure as said: 1/Z of eq. (16), when last grounded.
+    described: Arc<BTreeMap<(u32, LabelId), f64>>,
 }
 
 impl Labels {
@@ -107,6 +109,9 @@ impl Labels {
 
     /// Takes back what an utterance said, what was carried over from it too. Whether there was any.
     pub fn revoke(&mut self, utterance: u32) -> bool {
+        if self.described.keys().any(|(u, _)| *u == utterance) {
+            Arc::make_mut(&mut self.described).retain(|(u, _), _| *u != utterance);
+        }
         self.drop_if(|e| e.utterance == utterance)
     }
 
@@ -125,6 +130,19 @@ impl Labels {
             Arc::make_mut(&mut self.evidence).extend_from_slice(grounded);
         }
         before
+    }
+
+    /// How much likelier what an utterance says of a figure is in this map than where nobody knows anything:
+    /// 1/Z of eq. (16), "not there yet" included, so that it says more when it is grounded anew.
+    pub fn described(&self, utterance: u32, figure: LabelId) -> f64 {
+        self.described.get(&(utterance, figure)).copied().unwrap_or(1.0)
+    }
+
+    /// Sets [`Labels::described`].
+    pub fn describe(&mut self, utterance: u32, figure: LabelId, ratio: f64) {
+        if self.described.get(&(utterance, figure)) != Some(&ratio) {
+            Arc::make_mut(&mut self.described).insert((utterance, figure), ratio);
+        }
     }
 
     /// Looks up anew what the names mean. Returns the places whose names mean something else now.

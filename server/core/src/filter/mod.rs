@@ -10,6 +10,7 @@ pub mod failure;
 pub mod ghosts;
 pub mod labels;
 pub mod loops;
+pub mod naming;
 pub mod particle;
 pub mod propose;
 pub mod prune;
@@ -126,19 +127,6 @@ impl Filter {
     /// themselves.
     pub fn unresolved(&self) -> f64 {
         self.ghosts.unresolved()
-    }
-
-    /// Weighs every particle anew by what was said.
-    pub fn weigh_words(&mut self, words: &dyn Words) {
-        let before = self.best().log_words;
-        self.particles.par_iter_mut().for_each(|p| {
-            let log_words = words.log_likelihood(p);
-            p.log_weight += log_words - p.log_words;
-            p.log_words = log_words;
-        });
-        self.rank();
-        // A sentence that the kept graphs did not expect speaks for what was dropped.
-        self.ghosts.kept_gained((self.best().log_words - before).min(0.0));
     }
 
     /// The best particle.

@@ -168,17 +168,6 @@ impl Particle {
         Ok(())
     }
 
-    /// Weighs by what a sentence says for or against this graph; see [`crate::talk::predictive`].
-    pub fn weigh_by_words(&mut self, _utterance: u32, log_ratio: f64) {
-        self.log_weight += log_ratio;
-        self.log_words += log_ratio;
-    }
-
-    /// Takes back what an utterance put into labels.
-    pub fn revoke(&mut self, utterance: u32) {
-        self.labels.revoke(utterance);
-    }
-
     /// w.
     pub fn weight(&self) -> f64 {
         self.log_weight.exp()

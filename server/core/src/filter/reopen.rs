@@ -68,9 +68,7 @@ impl Filter {
             }
             p.log_weight += ghost.since - judged.log_there;
         }
-        let log_words = words.log_likelihood(&p);
-        p.log_weight += log_words - p.log_words;
-        p.log_words = log_words;
+        p.weigh_words(words);
         Some(p)
     }
 }

@@ -7,13 +7,12 @@ use crate::filter::labels::{Evidence, LabelId, Labels, Source};
 use crate::filter::particle::Particle;
 use crate::filter::second_look::gained;
 use crate::geometry::Pose2;
-use crate::language::act::{Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
+use crate::language::act::{Analysis, Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
 use crate::language::{
     GroundPlace, Grounding, LandmarkBelief, Narrowing, Reading, Relation, ground_by_paper, ground_clause,
     pointed_to, seen_from_here,
 };
 use crate::talk::ledger::Ledger;
-use crate::talk::predictive::log_located;
 use crate::talk::{Here, Talk};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
@@ -27,18 +26,17 @@ const AGAIN_PER_PLACE: usize = 1;
 const THIS_M: f64 = 10.0;
 
 /// Grounds what a sentence locates in every particle, anew if it was before. `poses` of a particle's
-/// places, with the path travelled up to each. Returns what the sentence says for or against each
-/// particle, if it locates anything.
+/// places, with the path travelled up to each.
 pub(crate) fn ground(
     talk: &mut Talk,
     filter: &mut Filter,
     (utterance, parse, held): (u32, &Parse, Vertex),
     poses: &(dyn Fn(&Particle) -> Vec<Pose2> + Sync),
     path_m: &[f64],
-) -> Vec<f64> {
+) {
     let figures: Vec<_> = located(parse).iter().filter_map(|(_, l)| l.figure.label()).collect();
     if figures.is_empty() {
-        return Vec::new();
+        return;
     }
     let ledger = Arc::make_mut(&mut talk.ledger);
     for name in &figures {
@@ -54,13 +52,14 @@ pub(crate) fn ground(
             held: held as usize,
             by_paper,
         };
-        let (grounded, log_ratio) = scene.grounded(parse);
-        (gained(&p.labels.reground(utterance, &grounded), &grounded), log_ratio)
+        let (grounded, ratios) = scene.grounded(parse);
+        for (figure, ratio) in ratios {
+            p.labels.describe(utterance, figure, ratio);
+        }
+        gained(&p.labels.reground(utterance, &grounded), &grounded)
     };
-    let (gained, log_ratios): (Vec<Vec<Vertex>>, Vec<f64>) =
-        filter.particles.par_iter_mut().map(ground).unzip();
+    let gained: Vec<Vec<Vertex>> = filter.particles.par_iter_mut().map(ground).collect();
     filter.named_anew(gained.into_iter().flatten().collect::<BTreeSet<_>>());
-    log_ratios
 }
 
 /// Grounds some descriptions again, one after the other in turn, in the map as it is now.
@@ -126,8 +125,8 @@ struct Scene<'a> {
 
 impl Scene<'_> {
     /// Δα of all that a sentence locates: for each figure a clause, summed over its readings. Beside it
-    /// log p(λ | G), over that of a sentence that says nothing.
-    fn grounded(&self, parse: &Parse) -> (Vec<Evidence>, f64) {
+    /// for each how much likelier it is here than where nobody knows anything.
+    fn grounded(&self, parse: &Parse) -> (Vec<Evidence>, Vec<(LabelId, f64)>) {
         let mut clauses: BTreeMap<LabelId, Vec<(f64, Locate)>> = BTreeMap::new();
         for (certainty, l) in located(parse) {
             let said = l.figure.label().and_then(|name| self.ledger.said(name.as_str()));
@@ -136,12 +135,12 @@ impl Scene<'_> {
                 clauses.entry(said).or_default().push((certainty, l));
             }
         }
-        let (mut grounded, mut log_ratio) = (Vec::new(), 0.0);
+        let (mut grounded, mut ratios) = (Vec::new(), Vec::new());
         for (said, readings) in clauses {
             let label = self.ledger.meant(said);
             let certainty = readings.iter().map(|r| r.0).sum::<f64>().min(1.0);
             let Grounding { p, likelihood_ratio, .. } = self.place_of(&readings, label);
-            log_ratio += certainty * log_located(likelihood_ratio);
+            ratios.push((said, likelihood_ratio));
             grounded.extend(p.iter().enumerate().filter(|(_, p)| *p * certainty >= GROUNDED_MIN).map(
                 |(v, p)| {
                     let (utterance, place, weight) = (self.utterance, v as Vertex, certainty * p);
@@ -149,7 +148,7 @@ impl Scene<'_> {
                 },
             ));
         }
-        (grounded, log_ratio)
+        (grounded, ratios)
     }
 
     /// p(figure is place i | λ), eq. (14), given what is located as its readings say.
@@ -235,6 +234,12 @@ impl Scene<'_> {
 
 /// What the readings of a text locate, each with the probability that it is said and meant.
 pub(crate) fn located(parse: &Parse) -> Vec<(f64, Locate)> {
+    let of = |a: &Analysis| located_by(a).into_iter().map(|(p, l)| (a.weight * p, l)).collect::<Vec<_>>();
+    parse.analyses.iter().flat_map(of).collect()
+}
+
+/// What one reading locates, each with the probability that it is meant.
+pub(crate) fn located_by(reading: &Analysis) -> Vec<(f64, Locate)> {
     let of = |content: &Content| match content {
         Content::Label { at, what, .. } if at.head == Head::There => Some(pointed_to(what)),
         Content::Locate(l) if l.figure.head == Head::Here => seen_from_here(l),
@@ -247,9 +252,8 @@ pub(crate) fn located(parse: &Parse) -> Vec<(f64, Locate)> {
         },
         _ => None,
     };
-    let acts = parse.analyses.iter().flat_map(|a| a.acts.iter().map(|act| (a.weight * act.certainty, act)));
     let there = |l: &Locate| l.relation == Relation::At && l.landmarks.iter().any(|p| p.head == Head::There);
-    let all = acts.filter_map(|(p, act)| Some((p, of(&act.content)?)));
+    let all = reading.acts.iter().filter_map(|act| Some((act.certainty, of(&act.content)?)));
     all.map(|(p, l)| (p, if there(&l) { pointed_to(&l.figure) } else { l })).collect()
 }
 

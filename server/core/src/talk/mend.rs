@@ -42,10 +42,10 @@ pub(crate) fn undo(talk: &mut Talk, filter: &mut Filter, id: Option<&str>) -> Re
 pub(crate) fn strike(talk: &mut Talk, filter: &mut Filter, number: u32) -> usize {
     Arc::make_mut(&mut talk.ledger).strike(number);
     for p in &mut filter.particles {
-        p.revoke(number);
+        p.labels.revoke(number);
     }
     resolve(talk, filter);
-    filter.rank();
+    filter.weigh_words(talk);
     0
 }
 

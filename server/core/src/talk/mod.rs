@@ -1,16 +1,18 @@
 //! What sentences do to the posterior: step 3 of Algorithm 1, and the words' share of step 4.
 //!
 //! ```text
-//! sentence ─ listen ─▶ language ─▶ take_in ─▶ ledger, labels, predictive (weights)
+//! sentence ─ listen ─▶ language ─▶ take_in ─▶ ledger, claims, labels
 //!                                  describe ─▶ labels: grounded when said, and again as the map grows
 //! "no, …", undo ─ mend ─▶ the same taken back
+//! ledger, claims, one particle's map ─ fold ─▶ p(λ | G)
 //! ```
 
+pub mod claims;
 mod describe;
+mod fold;
 pub mod ledger;
 mod listen;
 mod mend;
-pub mod predictive;
 mod take_in;
 
 use crate::edge::Vertex;
@@ -18,7 +20,9 @@ use crate::effects::Heard;
 use crate::event::{Command, Utterance};
 use crate::filter::Filter;
 use crate::filter::particle::Particle;
+use crate::filter::words::Words;
 use crate::geometry::Pose2;
+use claims::Testimonies;
 use ledger::Ledger;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -38,6 +42,14 @@ pub struct Here<'a> {
 pub struct Talk {
     /// What was said.
     pub ledger: Arc<Ledger>,
+    /// What of it is likelier in some graphs than in others.
+    pub testimonies: Testimonies,
+}
+
+impl Words for Talk {
+    fn log_likelihood(&self, particle: &Particle) -> f64 {
+        fold::log_likelihood(self, particle)
+    }
 }
 
 impl Talk {
@@ -48,22 +60,20 @@ impl Talk {
 
     /// Does what an operator asks, and tells what was done or why not.
     pub fn mend(&mut self, filter: &mut Filter, command: &Command) -> Result<String, String> {
-        mend::mend(self, filter, command)
+        let done = mend::mend(self, filter, command);
+        filter.weigh_words(self);
+        done
     }
 
     /// Grounds some descriptions again, one after the other in turn, in the map as it is now.
     pub fn reground(&mut self, filter: &mut Filter) {
         describe::reground(self, filter);
+        filter.weigh_words(self);
     }
 
     /// Grounds all descriptions again.
     pub fn reground_all(&mut self, filter: &mut Filter) {
         describe::reground_all(self, filter);
-    }
-}
-
-impl crate::filter::words::Words for Talk {
-    fn log_likelihood(&self, particle: &Particle) -> f64 {
-        particle.log_words
+        filter.weigh_words(self);
     }
 }

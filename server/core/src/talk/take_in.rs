@@ -1,13 +1,13 @@
-//! What the acts of a sentence do to every particle: its weight, by what was said before (4), and its
-//! labels, eq. (12).
+//! What the acts of a sentence do: they are kept as claims, which weigh graphs (see `fold`), and to every
+//! particle's labels they add, eq. (12).
 
 use crate::edge::Vertex;
 use crate::filter::Filter;
 use crate::filter::labels::{DIRECT, Evidence, LabelId, Labels, Source, tie};
-use crate::language::act::{Content, Head, Locate, Parse, Phrase, Sameness};
-use crate::talk::describe::{ground, reground_about};
+use crate::language::act::{Analysis, Content, Head, Locate, Parse, Phrase, Sameness};
+use crate::talk::claims::{Claim, Claims, Testimony};
+use crate::talk::describe::{ground, located_by, reground_about};
 use crate::talk::mend::{resolve, strike};
-use crate::talk::predictive::{base_probability, log_denied, log_label};
 use crate::talk::{Here, Talk};
 use std::sync::Arc;
 
@@ -23,6 +23,8 @@ struct Saying<'a> {
     utterance: u32,
     held: Vertex,
     here: &'a Here<'a>,
+    /// What the reading at hand claims.
+    claims: Vec<(f64, Claim)>,
 }
 
 /// Takes in all readings of a sentence said at the place `held`, each by its probability. What takes
@@ -33,71 +35,77 @@ pub(crate) fn take_in(
     (utterance, parse, held): (u32, &Parse, Vertex),
     here: &Here,
 ) {
-    let mut saying = Saying { talk: &mut *talk, filter: &mut *filter, utterance, held, here };
+    let mut readings = Vec::new();
+    let mut saying =
+        Saying { talk: &mut *talk, filter: &mut *filter, utterance, held, here, claims: Vec::new() };
     for (k, analysis) in parse.analyses.iter().enumerate() {
         for act in &analysis.acts {
-            saying.take(&act.content, analysis.weight * act.certainty, k == 0);
+            saying.take(&act.content, (analysis.weight, act.certainty), k == 0);
         }
+        saying.locate(analysis);
+        readings.push(Claims { weight: analysis.weight, claims: std::mem::take(&mut saying.claims) });
     }
-    let log_ratios = ground(talk, filter, (utterance, parse, held), here.poses, &here.path_m);
-    for (p, log_ratio) in filter.particles.iter_mut().zip(log_ratios) {
-        p.weigh_by_words(utterance, log_ratio);
+    // The paper's words weigh nothing.
+    if !filter.config.rules.by_paper() {
+        talk.testimonies.add(Testimony { utterance, readings }, filter.best(), here);
     }
-    filter.rank();
+    ground(talk, filter, (utterance, parse, held), here.poses, &here.path_m);
+    filter.weigh_words(talk);
 }
 
 impl Saying<'_> {
-    fn take(&mut self, content: &Content, certainty: f64, likeliest: bool) {
+    /// `p` of a reading, and within it of the act.
+    fn take(&mut self, content: &Content, p: (f64, f64), likeliest: bool) {
         if self.filter.config.rules.by_paper() && !matches!(content, Content::Label { .. }) {
             return;
         }
         match content {
-            Content::Label { at, what, sameness } => self.call(at, what, *sameness, certainty),
-            Content::Alias { what, also } if likeliest => self.alias(what, also),
-            Content::Same { what, like, same: true } => self.tie(what, like, certainty),
-            Content::Negate(content) if likeliest => self.deny(content, certainty),
-            Content::Correct { was, is } if likeliest => self.correct(was.as_deref(), is, certainty),
+            Content::Label { at, what, sameness } => self.call(at, what, *sameness, p),
+            Content::Alias { what, also } if likeliest => self.alias(what, also, p),
+            Content::Same { what, like, same } => self.tie(what, like, *same, p),
+            Content::Negate(content) if likeliest => self.deny(content, p),
+            Content::Correct { was, is } if likeliest => self.correct(was.as_deref(), is, p),
             // Located in `ground`, together and again later; the others say nothing of places.
             _ => {}
         }
     }
 
+    /// What a reading locates, in `ground`.
+    fn locate(&mut self, reading: &Analysis) {
+        for (certainty, l) in located_by(reading) {
+            if let Some(name) = l.figure.label() {
+                let said = Arc::make_mut(&mut self.talk.ledger).enter_name(&name);
+                self.claims.push((certainty, Claim::Located { said }));
+            }
+        }
+    }
+
     /// "This is the gym."
-    fn call(&mut self, at: &Phrase, what: &Phrase, sameness: Sameness, certainty: f64) {
+    fn call(&mut self, at: &Phrase, what: &Phrase, again: Sameness, (reading, certainty): (f64, f64)) {
         let (Some(place), Some(name)) = (self.place_meant(at), what.label()) else { return };
         let ledger = Arc::make_mut(&mut self.talk.ledger);
         let said = ledger.enter_name(&name);
         let label = ledger.meant(said);
-        let p0 = self.base_probability(label);
-        let source = if sameness == Sameness::Other { Source::DirectOther } else { Source::Direct };
-        let Saying { utterance, here, .. } = *self;
-        let evidence = Evidence { utterance, said, label, place, weight: DIRECT * certainty, source };
-        for p in &mut self.filter.particles {
-            let log = log_label(&p.labels, &(here.poses)(p), (place, label), sameness, p0);
-            if !self.filter.config.rules.by_paper() {
-                p.weigh_by_words(utterance, certainty * log);
-            }
-            p.labels.add(evidence);
-        }
+        self.claims.push((certainty, Claim::Called { place, said, again }));
+        let source = if again == Sameness::Other { Source::DirectOther } else { Source::Direct };
+        let (utterance, weight) = (self.utterance, DIRECT * reading * certainty);
+        self.add(Evidence { utterance, said, label, place, weight, source });
         self.filter.named_anew([place]);
         reground_about(self.talk, self.filter, label, self.here);
     }
 
-    /// p₀ of a name: how often it was given among all names given.
-    fn base_probability(&self, label: LabelId) -> f64 {
-        let direct = |e: &&Evidence| matches!(e.source, Source::Direct | Source::DirectOther);
-        let given = || self.filter.best().labels.evidence().iter().filter(direct);
-        base_probability(given().filter(|e| e.label == label).count(), given().count())
+    fn add(&mut self, evidence: Evidence) {
+        self.filter.particles.iter_mut().for_each(|p| p.labels.add(evidence));
     }
 
     /// "The gym is also called the arena"; "the last office on the left is Nick's" locates it.
-    fn alias(&mut self, what: &Phrase, also: &Phrase) {
+    fn alias(&mut self, what: &Phrase, also: &Phrase, p: (f64, f64)) {
         let Some(other) = also.label() else { return };
         if !what.within.is_empty() {
             return;
         }
         if let (None, Some(_)) = (what.label(), self.place_meant(what)) {
-            return self.call(what, also, Sameness::Open, 1.0);
+            return self.call(what, also, Sameness::Open, p);
         }
         let Some(name) = what.label() else { return };
         let ledger = Arc::make_mut(&mut self.talk.ledger);
@@ -106,41 +114,56 @@ impl Saying<'_> {
         resolve(self.talk, self.filter);
     }
 
-    /// "We are back where we started."
-    fn tie(&mut self, what: &Phrase, like: &Phrase, certainty: f64) {
-        let (Some(a), Some(b)) = (self.place_meant(what), self.place_meant(like)) else {
-            return;
+    /// "We are back where we started", "we have not been here before", "this is the same place as the gym".
+    fn tie(&mut self, what: &Phrase, like: &Phrase, same: bool, p: (f64, f64)) {
+        // "The kitchen is where we started" names the start; "this is the same place as the kitchen" is back.
+        let (what, like, again) = match self.place_meant(what) {
+            Some(_) => (what, like, Sameness::Same),
+            None => (like, what, Sameness::Open),
         };
-        let utterance = self.utterance;
-        for p in &mut self.filter.particles {
-            for place in [a, b] {
-                p.labels.add(Evidence::new(
-                    utterance,
-                    tie(utterance),
-                    place,
-                    DIRECT * certainty,
-                    Source::Tied,
-                ));
-            }
+        let Some(place) = self.place_meant(what) else { return };
+        if like.label().is_some() {
+            return if same { self.call(what, like, again, p) } else { self.not_called(place, like, p) };
         }
-        self.filter.named_anew([a, b]);
+        if matches!(like.head, Head::Visited) {
+            return self.claims.push((p.1, Claim::Visited { place, before: same }));
+        }
+        let Some(other) = self.place_meant(like) else { return };
+        self.claims.push((p.1, Claim::One { a: place, b: other, same }));
+        if same {
+            let (utterance, weight) = (self.utterance, DIRECT * p.0 * p.1);
+            for place in [place, other] {
+                self.add(Evidence::new(utterance, tie(utterance), place, weight, Source::Tied));
+            }
+            self.filter.named_anew([place, other]);
+        }
     }
 
     /// "This is not the kitchen."
-    fn deny(&mut self, content: &Content, certainty: f64) {
-        let Content::Label { at, what, .. } = content else { return };
-        let (Some(place), Some(name)) = (self.place_meant(at), what.label()) else { return };
+    fn deny(&mut self, content: &Content, p: (f64, f64)) {
+        match content {
+            Content::Label { at, what, .. } => {
+                if let Some(place) = self.place_meant(at) {
+                    self.not_called(place, what, p);
+                }
+            }
+            Content::Same { what, like, same } => self.tie(what, like, !same, p),
+            _ => {}
+        }
+    }
+
+    fn not_called(&mut self, place: Vertex, what: &Phrase, (reading, certainty): (f64, f64)) {
+        let Some(name) = what.label() else { return };
         let ledger = Arc::make_mut(&mut self.talk.ledger);
         let said = ledger.enter_name(&name);
         let label = ledger.meant(said);
+        self.claims.push((certainty, Claim::Denied { place, said }));
+        let (utterance, weight) = (self.utterance, -DIRECT * reading * certainty);
         for p in &mut self.filter.particles {
             let poses = (self.here.poses)(p);
-            let log = log_denied(&p.labels, &poses, (place, label));
-            p.weigh_by_words(self.utterance, certainty * log);
             for place in called_so(&p.labels, label, |v| {
                 v == place || poses[v as usize].distance_m(&poses[place as usize]) < DENIED_REACH_M
             }) {
-                let (utterance, weight) = (self.utterance, -DIRECT * certainty);
                 p.labels.add(Evidence { utterance, said, label, place, weight, source: Source::Denied });
             }
         }
@@ -148,19 +171,19 @@ impl Saying<'_> {
 
     /// "No, this is the gym, not the kitchen": the sentence that said so before is taken back; if
     /// there is none, it is denied.
-    fn correct(&mut self, was: Option<&Content>, is: &Content, certainty: f64) {
+    fn correct(&mut self, was: Option<&Content>, is: &Content, p: (f64, f64)) {
         if let (Some(Content::Label { at, what: old, .. }), Content::Label { what: new, .. }) = (was, is)
             && at.head == Head::Any
         {
-            return self.alias(new, old);
+            return self.alias(new, old, p);
         }
         match self.said_before(was, is) {
             Some(number) => {
                 strike(self.talk, self.filter, number);
             }
-            None => was.into_iter().for_each(|was| self.deny(was, certainty)),
+            None => was.into_iter().for_each(|was| self.deny(was, p)),
         }
-        self.take(is, certainty, true);
+        self.take(is, p, true);
     }
 
     /// The newest sentence that stands and says what is taken back: of that name near that place, or

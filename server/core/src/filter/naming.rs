@@ -1,0 +1,143 @@
+//! The one model of names: whether a name applies, what will be said next, and who is called alike.
+//!
+//! A support (a place with what lies near it; a room once rooms are known) bears names with a Dirichlet
+//! over an open vocabulary, eq. (12): what was said of it, over a base measure p₀ of total concentration
+//! [`BASE`]. A sentence is false with probability ε = [`FALSE_TALK`]. One utterance is one unit of evidence.
+//!
+//! ```text
+//! p(l | evidence)   = (α_l + α₀ p₀(l) f_l) / Σ_k (α_k + α₀ p₀(k) f_k)       Σ_l p = 1
+//! p(λ | evidence)   = (1 − ε) p(l | evidence) + ε p₀(l)
+//! P(l applies)      = α_l / (α_l + ε / (1 − ε))                             1 − ε after one utterance
+//! ```
+//!
+//! α_l is what was said less what was denied. Where more was denied, α_l is 0 and f_l = P(denial is false)
+//! is left of the name's share in the base; else f_l is 1.
+
+use crate::filter::labels::LabelId;
+
+/// ε: one sentence in ten is false, misheard, or put where it does not belong.
+pub const FALSE_TALK: f64 = 0.1;
+/// α₀: total concentration of the names not said.
+pub const BASE: f64 = 1.0;
+/// Concentration against a name that was said: one utterance leaves ε of doubt.
+const DOUBT: f64 = FALSE_TALK / (1.0 - FALSE_TALK);
+/// Names people may use of a place before any was said: the size of the lexicon, about.
+const NAMES: f64 = 150.0;
+/// How near two places are for what is said of one to be expected of the other: standard deviation
+/// of a Gaussian kernel, the size of a room.
+const JOINED_M: f64 = 4.0;
+
+/// Over what a name holds: which sites share what is said of them.
+pub trait Support {
+    /// Calls `each` with every site joined with `here`, itself too, and the share of what is said there that
+    /// holds here, in (0, 1].
+    fn joined(&self, here: usize, each: impl FnMut(usize, f64));
+}
+
+/// Share of what is said of a place that holds for another, so far away in a particle's map.
+pub fn share(distance_m: f64) -> f64 {
+    (-0.5 * (distance_m / JOINED_M).powi(2)).exp()
+}
+
+/// Beyond, [`share`] is less than 4·10⁻⁶.
+pub const REACH_M: f64 = 5.0 * JOINED_M;
+
+/// What was said for a name and against it, in utterances.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Tally {
+    /// Said to be so.
+    pub said: f64,
+    /// Said not to be so.
+    pub denied: f64,
+}
+
+impl Tally {
+    /// α_l.
+    pub fn concentration(self) -> f64 {
+        (self.said - self.denied).max(0.0)
+    }
+
+    /// P(name applies).
+    pub fn applies(self) -> f64 {
+        self.concentration() / (self.concentration() + DOUBT)
+    }
+
+    /// f_l: what denial leaves of the name's share in the base measure.
+    pub fn left(self) -> f64 {
+        DOUBT / (DOUBT + (self.denied - self.said).max(0.0))
+    }
+
+    /// Adds a share of another.
+    pub fn add(&mut self, other: Self, share: f64) {
+        self.said += share * other.said;
+        self.denied += share * other.denied;
+    }
+}
+
+/// p₀: how often a name is said of anything.
+#[derive(Clone, Debug, Default)]
+pub struct BaseMeasure {
+    /// Utterances by name.
+    times: Vec<f64>,
+    all: f64,
+    /// Names said or that might be.
+    names: f64,
+}
+
+impl BaseMeasure {
+    /// Of so many names in the ledger, none said yet.
+    pub fn new(names: usize) -> Self {
+        Self { times: vec![0.0; names], all: 0.0, names: NAMES.max(names as f64 + 1.0) }
+    }
+
+    /// A name was said, with a probability.
+    pub fn count(&mut self, label: LabelId, units: f64) {
+        self.times[label as usize] += units;
+        self.all += units;
+    }
+
+    /// p₀(l) by all other sentences than one that said some names itself.
+    pub fn probability(&self, label: LabelId, itself: &[(LabelId, f64)]) -> f64 {
+        let own = itself.iter().filter(|o| o.0 == label).map(|o| o.1).sum::<f64>();
+        let times = self.times.get(label as usize).copied().unwrap_or(0.0);
+        let all = self.all - itself.iter().map(|o| o.1).sum::<f64>();
+        ((times - own).max(0.0) + 1.0) / (all.max(0.0) + self.names)
+    }
+}
+
+/// p(l | evidence) where no denial holds: of α_l among Σ α.
+pub fn probability(of_label: f64, all: f64, p0: f64) -> f64 {
+    (of_label + BASE * p0) / (all + BASE)
+}
+
+/// What a statement says for what makes it as probable as `ratio` times anything, when ε of talk is false.
+pub fn unless_false(ratio: f64) -> f64 {
+    (1.0 - FALSE_TALK) * ratio + FALSE_TALK
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn one_utterance_leaves_the_doubt_that_it_is_false_and_two_are_no_certainty() {
+        let p = |said, denied| Tally { said, denied }.applies();
+        assert!((p(1.0, 0.0) - 0.9).abs() < 1e-12);
+        assert!(p(2.0, 0.0) > 0.9 && p(2.0, 0.0) < 0.96);
+        assert_eq!((p(0.0, 0.0), p(1.0, 1.0), p(1.0, 2.0)), (0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn base_rates_sum_to_one_over_what_may_be_said() {
+        let mut base = BaseMeasure::new(3);
+        for (label, units) in [(0, 1.0), (0, 0.5), (2, 1.0)] {
+            base.count(label, units);
+        }
+        for own in [&[][..], &[(0, 0.5)]] {
+            // The other 147 names are as rare as one never said.
+            let sum = (0..3).map(|l| base.probability(l, own)).sum::<f64>()
+                + (NAMES - 3.0) * base.probability(99, own);
+            assert!((sum - 1.0).abs() < 1e-12);
+        }
+    }
+}

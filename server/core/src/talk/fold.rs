@@ -1,0 +1,305 @@
+//! p(λ | G): all claims folded in the order said, over one particle's map. A pure function of ledger, poses
+//! and how well the descriptions fit there.
+//!
+//! Names come first, each given those before it ([`crate::filter::naming`]); descriptions are given all names, so
+//! nothing is told twice. Readings are alternatives, and so are the claim and its being said of nothing:
+//!
+//! ```text
+//! log p(λ_n | G, λ_<n) − log p₀ = log( Σ_r w_r Π_c (q_c ratio_c + 1 − q_c) + 1 − Σ_r w_r )
+//! ```
+
+use crate::edge::Vertex;
+use crate::filter::labels::LabelId;
+use crate::filter::naming::{BASE, BaseMeasure, REACH_M, Support, Tally, share, unless_false};
+use crate::filter::particle::Particle;
+use crate::geometry::Pose2;
+use crate::language::act::Sameness;
+use crate::talk::Talk;
+use crate::talk::claims::{Claim, Claims, Testimony};
+use std::collections::BTreeMap;
+
+/// How often two places spoken of lie in one room by chance: a room of some floor.
+const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
+/// How often a place has been seen before when somebody speaks of it.
+const VISITED_BY_CHANCE: f64 = 0.3;
+/// Places so far back along the path are no visit before.
+const VISITED_BACK: Vertex = 12;
+/// Two successive places are hardly farther apart.
+const SPACING_MAX_M: f64 = 2.0;
+
+/// Places spoken of, where one particle has them: what is said of one holds for what lies near.
+struct Near {
+    sites: Vec<Pose2>,
+    cells: BTreeMap<(i64, i64), Vec<u32>>,
+}
+
+fn cell(pose: &Pose2) -> (i64, i64) {
+    ((pose.x_m / REACH_M).floor() as i64, (pose.y_m / REACH_M).floor() as i64)
+}
+
+impl Near {
+    fn new(sites: Vec<Pose2>) -> Self {
+        let mut cells: BTreeMap<(i64, i64), Vec<u32>> = BTreeMap::new();
+        for (k, site) in sites.iter().enumerate() {
+            cells.entry(cell(site)).or_default().push(k as u32);
+        }
+        Self { sites, cells }
+    }
+}
+
+impl Support for Near {
+    fn joined(&self, here: usize, mut each: impl FnMut(usize, f64)) {
+        let at = &self.sites[here];
+        let (x, y) = cell(at);
+        let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy)));
+        for &k in around.filter_map(|c| self.cells.get(&c)).flatten() {
+            let distance_m = at.distance_m(&self.sites[k as usize]);
+            if distance_m < REACH_M {
+                each(k as usize, share(distance_m));
+            }
+        }
+    }
+}
+
+/// log p(λ_1 … λ_n | G, X, L), relative to sentences that say nothing.
+pub fn log_likelihood(talk: &Talk, particle: &Particle) -> f64 {
+    let standing: Vec<(&Testimony, Vec<Units>)> =
+        talk.testimonies.iter().filter(|t| talk.stands(t.utterance)).map(|t| (t, talk.units(t))).collect();
+    if standing.is_empty() {
+        return 0.0;
+    }
+    let mut base = BaseMeasure::new(talk.ledger.names().len());
+    let mut numbers = BTreeMap::new();
+    let mut sites = Vec::new();
+    for units in standing.iter().flat_map(|(_, units)| units) {
+        base.count(units.label, units.tally.said);
+        if let Some(pose) = talk.testimonies.pose(particle, units.place) {
+            numbers.entry(units.place).or_insert_with(|| {
+                sites.push(pose);
+                sites.len() - 1
+            });
+        }
+    }
+    let told = vec![Vec::new(); sites.len()];
+    let joined = Joined::of(talk.ledger.names().len());
+    let mut fold = Fold { talk, particle, base, numbers, near: Near::new(sites), told, joined };
+    let log_ratios = standing.iter().map(|(t, units)| {
+        let ratio = fold.ratio(t, units);
+        fold.hear(units);
+        ratio.ln()
+    });
+    log_ratios.sum()
+}
+
+/// What an utterance says of a name at a place: at most one in all its readings.
+#[derive(Clone, Copy)]
+struct Units {
+    place: Vertex,
+    label: LabelId,
+    tally: Tally,
+}
+
+impl Talk {
+    fn stands(&self, utterance: u32) -> bool {
+        self.ledger.entries().get(utterance as usize).is_some_and(|e| e.stands)
+    }
+
+    /// What a name as said in an utterance means, unless it was forgotten since.
+    fn meant(&self, utterance: u32, said: LabelId) -> Option<LabelId> {
+        let label = self.ledger.meant(said);
+        self.ledger.speaks_of(utterance, label).then_some(label)
+    }
+
+    fn units(&self, testimony: &Testimony) -> Vec<Units> {
+        let mut units: Vec<Units> = Vec::new();
+        for Claims { weight, claims } in &testimony.readings {
+            for &(certainty, claim) in claims {
+                let one = weight * certainty;
+                let (place, said, tally) = match claim {
+                    Claim::Called { place, said, .. } => (place, said, Tally { said: one, denied: 0.0 }),
+                    Claim::Denied { place, said } => (place, said, Tally { said: 0.0, denied: one }),
+                    _ => continue,
+                };
+                let Some(label) = self.meant(testimony.utterance, said) else { continue };
+                match units.iter_mut().find(|u| (u.place, u.label) == (place, label)) {
+                    Some(known) => known.tally.add(tally, 1.0),
+                    None => units.push(Units { place, label, tally }),
+                }
+            }
+        }
+        for Units { tally, .. } in &mut units {
+            *tally = Tally { said: tally.said.min(1.0), denied: tally.denied.min(1.0) };
+        }
+        units
+    }
+}
+
+/// The evidence joined with one place, by name.
+struct Joined {
+    of: Vec<Tally>,
+    /// Names with any.
+    names: Vec<LabelId>,
+}
+
+impl Joined {
+    fn of(names: usize) -> Self {
+        Self { of: vec![Tally::default(); names], names: Vec::new() }
+    }
+
+    fn clear(&mut self) {
+        for &label in &self.names {
+            self.of[label as usize] = Tally::default();
+        }
+        self.names.clear();
+    }
+
+    fn add(&mut self, label: LabelId, tally: Tally, share: f64) {
+        let known = &mut self.of[label as usize];
+        if *known == Tally::default() {
+            self.names.push(label);
+        }
+        known.add(tally, share);
+    }
+
+    /// Σ_k (α_k + α₀ p₀(k) f_k).
+    fn total(&self, p0: impl Fn(LabelId) -> f64) -> f64 {
+        let of = |&label: &LabelId| {
+            let tally = self.of[label as usize];
+            let left = tally.left();
+            let denied = if left < 1.0 { BASE * p0(label) * (1.0 - left) } else { 0.0 };
+            tally.concentration() - denied
+        };
+        BASE + self.names.iter().map(of).sum::<f64>()
+    }
+}
+
+/// What was said so far, over one particle's map.
+struct Fold<'a> {
+    talk: &'a Talk,
+    particle: &'a Particle,
+    base: BaseMeasure,
+    /// Sites by place.
+    numbers: BTreeMap<Vertex, usize>,
+    near: Near,
+    /// What was said of each site so far.
+    told: Vec<Vec<(LabelId, Tally)>>,
+    joined: Joined,
+}
+
+impl Fold<'_> {
+    fn hear(&mut self, units: &[Units]) {
+        for Units { place, label, tally } in units {
+            let Some(&site) = self.numbers.get(place) else { continue };
+            match self.told[site].iter_mut().find(|(l, _)| l == label) {
+                Some((_, known)) => known.add(*tally, 1.0),
+                None => self.told[site].push((*label, *tally)),
+            }
+        }
+    }
+
+    /// p(λ | G, λ before) over that of a sentence that says nothing.
+    fn ratio(&mut self, testimony: &Testimony, units: &[Units]) -> f64 {
+        let own: Vec<(LabelId, f64)> = units.iter().map(|u| (u.label, u.tally.said)).collect();
+        let (mut ratio, mut rest) = (0.0, 1.0);
+        for Claims { weight, claims } in &testimony.readings {
+            let each = |&(certainty, claim): &(f64, Claim)| {
+                let certainty = certainty.clamp(0.0, 1.0);
+                certainty * self.of_claim(testimony.utterance, claim, &own) + 1.0 - certainty
+            };
+            ratio += weight * claims.iter().map(each).product::<f64>();
+            rest -= weight;
+        }
+        ratio + rest.max(0.0)
+    }
+
+    fn of_claim(&mut self, utterance: u32, claim: Claim, own: &[(LabelId, f64)]) -> f64 {
+        match claim {
+            Claim::Called { place, said, again } => self.called(utterance, (place, said), again, own),
+            Claim::Denied { place, said } => self.denied(utterance, (place, said)),
+            Claim::One { a, b, same } => self.one(a, b, same),
+            Claim::Visited { place, before } => self.visited(place, before),
+            Claim::Located { said } => match self.talk.meant(utterance, said) {
+                Some(_) => unless_false(self.particle.labels.described(utterance, said)),
+                None => 1.0,
+            },
+        }
+    }
+
+    /// "This is the gym", by what was said before of what is near.
+    fn called(
+        &mut self,
+        utterance: u32,
+        (place, said): (Vertex, LabelId),
+        again: Sameness,
+        own: &[(LabelId, f64)],
+    ) -> f64 {
+        let Some(label) = self.talk.meant(utterance, said) else { return 1.0 };
+        self.join(place);
+        let (base, joined) = (&self.base, &self.joined);
+        let p0 = |l: LabelId| base.probability(l, own);
+        let tally = joined.of[label as usize];
+        match again {
+            Sameness::Open => {
+                let predicted = tally.concentration() + BASE * p0(label) * tally.left();
+                unless_false(predicted / joined.total(p0) / p0(label))
+            }
+            // "Back in the lobby": it was called so before.
+            Sameness::Same => unless_false(tally.concentration() / joined.total(p0) / p0(label)),
+            // "Another lobby": it was not.
+            Sameness::Other => unless_false(1.0 - tally.applies()),
+        }
+    }
+
+    /// "This is not the gym".
+    fn denied(&mut self, utterance: u32, (place, said): (Vertex, LabelId)) -> f64 {
+        let Some(label) = self.talk.meant(utterance, said) else { return 1.0 };
+        self.join(place);
+        unless_false(1.0 - self.joined.of[label as usize].applies())
+    }
+
+    /// Gathers what was said of a place and those near.
+    fn join(&mut self, place: Vertex) {
+        let Self { numbers, near, told, joined, .. } = self;
+        joined.clear();
+        if let Some(&site) = numbers.get(&place) {
+            near.joined(site, |k, share| {
+                told[k].iter().for_each(|&(label, tally)| joined.add(label, tally, share));
+            });
+        }
+    }
+
+    /// "This is where we started": density of lying in one room, over that of any two places.
+    fn one(&self, a: Vertex, b: Vertex, same: bool) -> f64 {
+        let pose = |v| self.talk.testimonies.pose(self.particle, v);
+        let (Some(a), Some(b)) = (pose(a), pose(b)) else { return 1.0 };
+        so(share(a.distance_m(&b)), ONE_BY_CHANCE, same)
+    }
+
+    /// "We have been here before".
+    fn visited(&self, place: Vertex, before: bool) -> f64 {
+        let Some(here) = self.talk.testimonies.pose(self.particle, place) else { return 1.0 };
+        so(share(nearest_m(self.particle, place, &here)), VISITED_BY_CHANCE, before)
+    }
+}
+
+/// What a yes or no says where the truth is `is`, and is so `by_chance`.
+fn so(is: f64, by_chance: f64, said: bool) -> f64 {
+    unless_false(if said { is / by_chance } else { (1.0 - is) / (1.0 - by_chance) })
+}
+
+/// How near the path came before, up to some metres before the place. Far stretches are skipped: a path
+/// is no shorter than the straight line.
+fn nearest_m(particle: &Particle, place: Vertex, here: &Pose2) -> f64 {
+    let belief = &particle.belief;
+    let end = place.saturating_sub(VISITED_BACK).min(belief.len() as Vertex);
+    let (mut v, mut nearest_m) = (0, f64::INFINITY);
+    while v < end {
+        let distance_m = belief.pose(v).distance_m(here);
+        nearest_m = nearest_m.min(distance_m);
+        v += (((distance_m - nearest_m.min(REACH_M)) / SPACING_MAX_M) as Vertex).max(1);
+    }
+    nearest_m
+}
+
+#[cfg(test)]
+mod tests;
