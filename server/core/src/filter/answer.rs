@@ -9,7 +9,6 @@ use crate::filter::question::{Question, Testimony};
 use crate::filter::weigh::Judgement;
 use crate::filter::words::Words;
 use crate::geometry::Pose2;
-use crate::graph::Graph;
 use crate::smoothing::Structure;
 
 /// Two answers that lay a place within so much of one another are one.
@@ -32,8 +31,11 @@ pub enum Stance {
         /// Whether it adds the edge.
         fits: bool,
     },
-    /// "Elsewhere", before or because it is the same look-alike as one before.
+    /// "Elsewhere", before.
     Elsewhere,
+    /// "Elsewhere", because its map shows a look-alike there that it has refused before. That one looks as it
+    /// did is expected as much as that a place does.
+    Again,
     /// Not asked yet: both answers, of which "there" weighs by so much more.
     Open {
         /// By so much.
@@ -43,16 +45,14 @@ pub enum Stance {
     },
 }
 
-/// Where a particle stands, from what it thinks of the fit; `stands` tells whether it knows the robot on old
-/// floor already, and `others` are the questions that the path here is about.
+/// Where a particle stands, from what it thinks of the fit; `others` are the questions about the same old
+/// path.
 pub fn stance<'a>(
-    graph: &Graph,
     particle: &Particle,
     edge: &Edge,
     testimony: &Testimony,
     judgement: Option<Judgement>,
-    stands: bool,
-    others: impl Iterator<Item = &'a Question>,
+    mut others: impl Iterator<Item = &'a Question>,
 ) -> Stance {
     let Some(Judgement { log_there, distance2, known, lets_go }) = judgement else { return Stance::Elsewhere };
     if particle.refused.contains(&testimony.question) {
@@ -62,16 +62,15 @@ pub fn stance<'a>(
         return Stance::There { log_gain: testimony.gained, fits: distance2 < OUTLIER };
     }
     if known {
-        // On floor that it knows to be old, nothing is news but that it is old at all.
-        return Stance::There { log_gain: if stands { 0.0 } else { log_there }, fits: true };
+        return Stance::There { log_gain: log_there, fits: true };
     }
     let pose = |v: Vertex| particle.belief.pose(v);
-    let here = pose(edge.i).compose(&edge.i_from_j);
+    let (here, there) = (pose(edge.j), pose(edge.i).compose(&edge.i_from_j));
     let says_same = |q: &Question| {
-        same(&here, &pose(q.i).compose(&q.i_from_j).compose(&graph.chained(q.j, edge.j)))
+        let there_by_q = pose(q.i).compose(&q.i_from_j).compose(&pose(q.j).between(&here));
+        particle.refused.contains(&q.id) && same(&there, &there_by_q)
     };
-    let mut refused = others.filter(|q| particle.refused.contains(&q.id));
-    if refused.any(says_same) { Stance::Elsewhere } else { Stance::Open { log_there, lets_go } }
+    if others.any(says_same) { Stance::Again } else { Stance::Open { log_there, lets_go } }
 }
 
 /// Whether two poses are one answer.
@@ -96,6 +95,9 @@ pub struct Child {
 
 /// All answers of all particles, likeliest first.
 pub fn children(particles: &[Particle], stances: &[Stance]) -> Vec<Child> {
+    // What is known to some and a look-alike seen again to others is news to neither.
+    let expected = |s: &Stance| if let Stance::There { log_gain, .. } = s { Some(*log_gain) } else { None };
+    let again = stances.iter().filter_map(expected).fold(0.0, f64::max);
     let of = |(parent, (p, stance)): (usize, (&Particle, &Stance))| {
         let child = |there, adds, log: f64| {
             Child { parent, there, adds, lets_go: None, log_weight: p.log_weight + log }
@@ -103,6 +105,7 @@ pub fn children(particles: &[Particle], stances: &[Stance]) -> Vec<Child> {
         match *stance {
             Stance::There { log_gain, fits } => vec![child(true, fits, log_gain)],
             Stance::Elsewhere => vec![child(false, false, 0.0)],
+            Stance::Again => vec![child(false, false, again)],
             Stance::Open { log_there, lets_go } => {
                 vec![child(false, false, 0.0), Child { lets_go, ..child(true, true, log_there) }]
             }

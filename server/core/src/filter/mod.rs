@@ -260,9 +260,8 @@ impl Filter {
         let Self { graph, structure, questions, .. } = self;
         let of = |p: &Particle| {
             let judgement = judge(graph, structure, p, edge);
-            let stands = p.taken.iter().rev().any(|&q| questions.is_fresh(graph, q, edge.j));
-            let others = questions.at(graph, edge.j).filter(|q| q.id != testimony.question);
-            (stance(graph, p, edge, testimony, judgement, stands, others), judgement)
+            let others = questions.about(graph, edge.i).filter(|q| q.id != testimony.question);
+            (stance(p, edge, testimony, judgement, others), judgement)
         };
         self.particles.par_iter().map(of).collect::<Vec<_>>().into_iter().unzip()
     }

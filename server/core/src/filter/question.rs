@@ -7,14 +7,14 @@
 //! for or against all that gave it.
 
 use crate::edge::{QuestionId, Vertex};
-use crate::filter::loops::{FOLLOW_REACH_M, Fit, agree};
+use crate::filter::loops::{Fit, agree};
 use crate::geometry::Pose2;
 use crate::graph::Graph;
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
 /// Questions remembered; the ones not seen for longest give way. A place has some eight fits.
-const REMEMBERED_MAX: usize = 64;
+const REMEMBERED_MAX: usize = 256;
 /// A revisit may go unseen for so much path, front-end increments being good to some decimetres over it, and
 /// is the same question when it is seen again: look-alikes that continue are the same look-alikes.
 const SAME_PATH_M: f64 = 40.0;
@@ -73,14 +73,9 @@ impl Questions {
         Testimony { question: id, log_looks, gained: log_looks - known }
     }
 
-    /// Questions that the path at place `t` is still about, the last seen first.
-    pub fn at<'a>(&'a self, graph: &'a Graph, t: Vertex) -> impl Iterator<Item = &'a Question> {
-        self.remembered.iter().filter(move |q| !graph.apart(q.j, t, SAME_PATH_M))
-    }
-
-    /// Whether a question was seen along the last metres of the path to place `t`.
-    pub fn is_fresh(&self, graph: &Graph, id: QuestionId, t: Vertex) -> bool {
-        self.remembered.iter().any(|q| q.id == id && !graph.apart(q.j, t, FOLLOW_REACH_M))
+    /// Questions of the old path around place `i`, the last seen first.
+    pub fn about<'a>(&'a self, graph: &'a Graph, i: Vertex) -> impl Iterator<Item = &'a Question> {
+        self.remembered.iter().filter(move |q| !graph.apart(q.i, i, SAME_PATH_M))
     }
 
     /// Whether a fit may still come that belongs to a question.
