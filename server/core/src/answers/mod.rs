@@ -4,3 +4,4 @@ pub mod grid;
 pub mod query;
 pub mod snapshot;
 pub mod trajectory;
+pub mod whereabouts;

@@ -4,6 +4,7 @@ use crate::answers::grid::grid;
 use crate::answers::query::{
     Answer, Candidate, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query, WhereAnswer,
 };
+use crate::answers::whereabouts::{Region, SAME_REGION_M, Whereabouts, whereabouts};
 use crate::edge::{PlaceId, Vertex};
 use crate::filter::Filter;
 use crate::filter::labels::LabelId;
@@ -19,8 +20,6 @@ use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Places nearer than this that bear one name are one candidate.
-const SAME_REGION_M: f64 = 6.0;
 /// Candidates told.
 const CANDIDATES_MAX: usize = 10;
 /// Names told of a place.
@@ -200,46 +199,33 @@ impl Snapshot {
             robot: self.robot,
         };
         let Some(label) = label else { return answer };
-        let mut candidates = self.regions(label);
-        // The name applies nowhere only if it applies to none of them; else one of them is meant.
-        let p_none: f64 = candidates.iter().map(|c| 1.0 - c.p_is).product();
-        let sum: f64 = candidates.iter().map(|c| c.p_is).sum();
-        for c in &mut candidates {
-            c.probability = (1.0 - p_none) * c.p_is / sum.max(f64::MIN_POSITIVE);
-        }
-        candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
-        candidates.truncate(CANDIDATES_MAX);
-        answer.p_none = 1.0 - candidates.iter().map(|c| c.probability).sum::<f64>();
-        answer.candidates = candidates;
+        let poses = |p: &Particle| poses(p, &self.places, &self.open);
+        let Whereabouts { mut regions, .. } = whereabouts(&self.particles, poses, label, PROBABILITY_MIN);
+        regions.retain(|r| r.p_is >= PROBABILITY_MIN);
+        regions.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
+        regions.truncate(CANDIDATES_MAX);
+        // None of those told: of the others each is next to impossible.
+        answer.p_none = 1.0 - regions.iter().map(|r| self.resolved() * r.probability).sum::<f64>();
+        answer.candidates = regions.into_iter().map(|r| self.candidate(label, r)).collect();
         answer
     }
 
-    /// Places that bear a name, near ones taken together under the likeliest.
-    fn regions(&self, label: LabelId) -> Vec<Candidate> {
-        let mut places: Vec<(Vertex, f64)> = self.applies(label).into_iter().collect();
-        places.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        let mut regions: Vec<(Vertex, f64)> = Vec::new();
-        for (v, p) in places {
-            let at = |u: Vertex| self.poses[u as usize];
-            let near = regions.iter_mut().find(|(u, _)| at(*u).distance_m(&at(v)) < SAME_REGION_M);
-            match near {
-                Some(region) => region.1 = 1.0 - (1.0 - region.1) * (1.0 - p),
-                None => regions.push((v, p)),
-            }
+    /// Share of the posterior that the particles stand for; what was pruned and may yet be true is none of
+    /// them, and no question is answered from it.
+    fn resolved(&self) -> f64 {
+        1.0
+    }
+
+    fn candidate(&self, label: LabelId, Region { place, p_is, probability }: Region) -> Candidate {
+        Candidate {
+            place: PlaceId::from(place),
+            label: self.ledger.name(label).to_owned(),
+            probability: self.resolved() * probability,
+            p_is,
+            pose: self.poses[place as usize],
+            covariance: self.covariance(place),
+            because: self.because(label, place),
         }
-        regions
-            .into_iter()
-            .filter(|(_, p)| *p >= PROBABILITY_MIN)
-            .map(|(v, p_is)| Candidate {
-                place: PlaceId::from(v),
-                label: self.ledger.name(label).to_owned(),
-                probability: p_is,
-                p_is,
-                pose: self.poses[v as usize],
-                covariance: self.covariance(v),
-                because: self.because(label, v),
-            })
-            .collect()
     }
 
     /// Spread of a place over the posterior, best particle's map axes: its own covariance there and

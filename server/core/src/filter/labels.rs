@@ -1,22 +1,15 @@
 //! Step 3 of Algorithm 1: the Dirichlet over labels at every vertex, eq. (12), kept as evidence.
 //!
-//! The vocabulary is open: a place's concentration over names is what was said of it, plus a total
-//! of [`BASE`] spread over everything that might be said. Evidence, not counters, is stored, so
-//! that each Δα can be traced to its utterance.
+//! Evidence, not counters, is stored, so that each Δα can be traced to its utterance; what it makes probable
+//! [`crate::filter::naming`] tells.
 
 use crate::edge::Vertex;
+pub use crate::filter::naming::LabelId;
+use crate::filter::naming::{Spoken, Tally, alike};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Index of a name in the ledger.
-pub type LabelId = u32;
-
-/// Total concentration of the names not said.
-pub const BASE: f64 = 1.0;
-/// Concentration against a name that was said: one utterance leaves one doubt in six, as the
-/// paper's α = 0.2 does.
-const DOUBT: f64 = 0.2;
 /// Δα of "this is the gym".
 pub const DIRECT: f64 = 1.0;
 /// Δα carried over a new edge from a directly labelled vertex.
@@ -63,33 +56,12 @@ impl Evidence {
     }
 }
 
-/// What speaks for a name at a place.
-#[derive(Clone, Copy, Debug)]
-struct Support {
-    /// Σ Δα of what was said of it.
-    said: f64,
-    /// Probability that no description means it.
-    undescribed: f64,
-}
-
-impl Default for Support {
-    fn default() -> Self {
-        Self { said: 0.0, undescribed: 1.0 }
-    }
-}
-
-impl Support {
-    fn take_up(&mut self, e: &Evidence) {
-        match e.source {
-            // The Δα of a description is a probability already, eq. (16).
-            Source::Grounded => self.undescribed *= 1.0 - e.weight.clamp(0.0, 1.0),
-            _ => self.said += e.weight,
-        }
-    }
-
-    fn probability(self) -> f64 {
-        let described = if self.said < 0.0 { 0.0 } else { 1.0 - self.undescribed };
-        1.0 - (1.0 - probability(self.said)) * (1.0 - described)
+/// Adds a Δα to what speaks for its name.
+fn take_up(spoken: &mut Spoken, e: &Evidence) {
+    match e.source {
+        Source::Grounded => spoken.undescribed *= 1.0 - e.weight.clamp(0.0, 1.0),
+        Source::Denied => spoken.tally.denied -= e.weight,
+        _ => spoken.tally.said += e.weight,
     }
 }
 
@@ -172,11 +144,11 @@ impl Labels {
 
     /// Probability that each name with evidence at a place applies to it.
     pub fn names(&self, place: Vertex) -> BTreeMap<LabelId, f64> {
-        let mut sums: BTreeMap<LabelId, Support> = BTreeMap::new();
+        let mut sums: BTreeMap<LabelId, Spoken> = BTreeMap::new();
         for e in self.evidence.iter().filter(|e| e.place == place) {
-            sums.entry(e.label).or_default().take_up(e);
+            take_up(sums.entry(e.label).or_default(), e);
         }
-        sums.into_iter().map(|(label, support)| (label, support.probability())).collect()
+        sums.into_iter().map(|(label, spoken)| (label, spoken.applies())).collect()
     }
 
     /// Probability that a name applies to each place that has evidence for it.
@@ -184,17 +156,23 @@ impl Labels {
         self.applies_if(|e| e.label == label)
     }
 
-    /// The same without what one utterance says: what it describes is not its own evidence.
-    pub fn applies_by_others(&self, label: LabelId, utterance: u32) -> BTreeMap<Vertex, f64> {
-        self.applies_if(|e| e.label == label && e.utterance != utterance)
+    /// The same without what one utterance says, what it describes is not its own evidence, and by what counts
+    /// only.
+    pub fn applies_by_others(
+        &self,
+        label: LabelId,
+        utterance: u32,
+        counts: impl Fn(&Evidence) -> bool,
+    ) -> BTreeMap<Vertex, f64> {
+        self.applies_if(|e| e.label == label && e.utterance != utterance && counts(e))
     }
 
     fn applies_if(&self, wanted: impl Fn(&Evidence) -> bool) -> BTreeMap<Vertex, f64> {
-        let mut sums: BTreeMap<Vertex, Support> = BTreeMap::new();
+        let mut sums: BTreeMap<Vertex, Spoken> = BTreeMap::new();
         for e in self.evidence.iter().filter(|e| wanted(e)) {
-            sums.entry(e.place).or_default().take_up(e);
+            take_up(sums.entry(e.place).or_default(), e);
         }
-        sums.into_iter().map(|(v, support)| (v, support.probability())).collect()
+        sums.into_iter().map(|(v, spoken)| (v, spoken.applies())).collect()
     }
 
     /// Eqs. (8–9): Σ_l p(l_t = l) p(l_i = l) for every other place i, over the names said (θ
@@ -205,11 +183,13 @@ impl Labels {
         if here.is_empty() {
             return BTreeMap::new();
         }
+        let left = self.left_by_denial();
+        let weight = |e: &Evidence| e.weight * left.get(&(e.place, e.label)).copied().unwrap_or(1.0);
         let mut totals: BTreeMap<Vertex, f64> = BTreeMap::new();
         for e in said() {
-            *totals.entry(e.place).or_insert(BASE) += e.weight;
+            *totals.entry(e.place).or_insert(0.0) += weight(e);
         }
-        let total = |v: Vertex| totals.get(&v).copied().unwrap_or(BASE);
+        let total = |v: Vertex| totals.get(&v).copied().unwrap_or(0.0);
         let mut similar = BTreeMap::new();
         for a in &here {
             for b in said().filter(|b| b.label == a.label && b.place != t) {
@@ -221,10 +201,28 @@ impl Labels {
                 if one_place || other(a, b) || other(b, a) {
                     continue;
                 }
-                *similar.entry(b.place).or_insert(0.0) += a.weight / total(t) * (b.weight / total(b.place));
+                *similar.entry(b.place).or_insert(0.0) +=
+                    alike(weight(a), total(t), weight(b), total(b.place));
             }
         }
         similar
+    }
+
+    /// Share of what was said of a place's name that denial has left, where any was denied.
+    fn left_by_denial(&self) -> BTreeMap<(Vertex, LabelId), f64> {
+        let key = |e: &Evidence| (e.place, e.label);
+        let denied = self.evidence.iter().filter(|e| e.source == Source::Denied);
+        let mut tallies: BTreeMap<_, Tally> = denied.map(|e| (key(e), Tally::default())).collect();
+        for e in self.evidence.iter() {
+            if let Some(tally) = tallies.get_mut(&key(e)) {
+                match e.source {
+                    Source::Denied => tally.denied -= e.weight,
+                    _ => tally.said += e.weight,
+                }
+            }
+        }
+        let left = |t: Tally| t.concentration() / t.said.max(f64::MIN_POSITIVE);
+        tallies.into_iter().map(|(key, tally)| (key, left(tally))).collect()
     }
 
     /// [`Labels::similar`] of one pair.
@@ -278,11 +276,6 @@ pub fn tie(utterance: u32) -> LabelId {
     LabelId::MAX - utterance
 }
 
-/// P(name applies) for a total Δα; what was denied as often as it was said does not.
-pub fn probability(weight: f64) -> f64 {
-    weight.max(0.0) / (weight.max(0.0) + DOUBT)
-}
-
 #[cfg(test)]
 #[allow(clippy::float_cmp)]
 mod tests {
@@ -322,7 +315,7 @@ mod tests {
         l.add(said(0, 0, 3, Source::Direct));
         l.carry_over(3, 50);
         l.carry_over(3, 51);
-        assert_eq!(l.names(50)[&0], probability(CARRIED));
+        assert_eq!(l.names(50)[&0], Tally { said: CARRIED, denied: 0.0 }.applies());
         assert!(l.names(51).is_empty());
     }
 
@@ -344,6 +337,8 @@ mod tests {
         l.add(said(0, 0, 3, Source::Direct));
         l.add(Evidence::new(1, 0, 3, -DIRECT, Source::Denied));
         assert_eq!(l.applies(0)[&3], 0.0);
+        l.add(said(1, 0, 90, Source::Direct));
+        assert_eq!(l.similarity(3, 90), 0.0, "nor is it a name in common");
         l.add(said(2, 0, 3, Source::Direct));
         assert!(l.applies(0)[&3] > 0.8);
     }

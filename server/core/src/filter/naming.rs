@@ -13,7 +13,11 @@
 //! α_l is what was said less what was denied. Where more was denied, α_l is 0 and f_l = P(denial is false)
 //! is left of the name's share in the base; else f_l is 1.
 
-use crate::filter::labels::LabelId;
+use crate::geometry::Pose2;
+use std::collections::BTreeMap;
+
+/// Index of a name in the ledger.
+pub type LabelId = u32;
 
 /// ε: one sentence in ten is false, misheard, or put where it does not belong.
 pub const FALSE_TALK: f64 = 0.1;
@@ -29,18 +33,60 @@ const JOINED_M: f64 = 4.0;
 
 /// Over what a name holds: which sites share what is said of them.
 pub trait Support {
-    /// Calls `each` with every site joined with `here`, itself too, and the share of what is said there that
-    /// holds here, in (0, 1].
+    /// Calls `each` with every site that anything was said of and that is joined with `here`, itself too, and
+    /// the share of what is said there that holds here, in (0, 1].
     fn joined(&self, here: usize, each: impl FnMut(usize, f64));
 }
 
 /// Share of what is said of a place that holds for another, so far away in a particle's map.
 pub fn share(distance_m: f64) -> f64 {
-    (-0.5 * (distance_m / JOINED_M).powi(2)).exp()
+    share_of_square(distance_m * distance_m)
+}
+
+fn share_of_square(distance_m2: f64) -> f64 {
+    (distance_m2 * (-0.5 / (JOINED_M * JOINED_M))).exp()
 }
 
 /// Beyond, [`share`] is less than 4·10⁻⁶.
 pub const REACH_M: f64 = 5.0 * JOINED_M;
+
+/// Places in one particle's map: what is said of one holds for what lies near, by [`share`].
+pub struct Near {
+    sites: Vec<Pose2>,
+    /// Sites with anything said of them, by square of [`REACH_M`].
+    cells: BTreeMap<(i64, i64), Vec<u32>>,
+}
+
+impl Near {
+    /// None of them has anything said of it yet.
+    pub fn new(sites: Vec<Pose2>) -> Self {
+        Self { sites, cells: BTreeMap::new() }
+    }
+
+    /// From now on something is said of a site. Once for each.
+    pub fn tell(&mut self, site: usize) {
+        self.cells.entry(cell(&self.sites[site])).or_default().push(site as u32);
+    }
+}
+
+fn cell(pose: &Pose2) -> (i64, i64) {
+    ((pose.x_m / REACH_M).floor() as i64, (pose.y_m / REACH_M).floor() as i64)
+}
+
+impl Support for Near {
+    fn joined(&self, here: usize, mut each: impl FnMut(usize, f64)) {
+        let at = &self.sites[here];
+        let (x, y) = cell(at);
+        let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy)));
+        for &k in around.filter_map(|c| self.cells.get(&c)).flatten() {
+            let to = &self.sites[k as usize];
+            let distance_m2 = (to.x_m - at.x_m).powi(2) + (to.y_m - at.y_m).powi(2);
+            if distance_m2 < REACH_M * REACH_M {
+                each(k as usize, share_of_square(distance_m2));
+            }
+        }
+    }
+}
 
 /// What was said for a name and against it, in utterances.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -71,6 +117,33 @@ impl Tally {
     pub fn add(&mut self, other: Self, share: f64) {
         self.said += share * other.said;
         self.denied += share * other.denied;
+    }
+}
+
+/// All that speaks for a name somewhere.
+#[derive(Clone, Copy, Debug)]
+pub struct Spoken {
+    /// What was said of it outright.
+    pub tally: Tally,
+    /// Probability that no description means it: the Δα of one is a probability already, eq. (16).
+    pub undescribed: f64,
+}
+
+impl Default for Spoken {
+    fn default() -> Self {
+        Self { tally: Tally::default(), undescribed: 1.0 }
+    }
+}
+
+impl Spoken {
+    /// Probability that a description means it; what was denied is not what was described.
+    pub fn described(self) -> f64 {
+        if self.tally.left() < 1.0 { 0.0 } else { 1.0 - self.undescribed }
+    }
+
+    /// P(name applies).
+    pub fn applies(self) -> f64 {
+        1.0 - (1.0 - self.tally.applies()) * (1.0 - self.described())
     }
 }
 
@@ -105,9 +178,10 @@ impl BaseMeasure {
     }
 }
 
-/// p(l | evidence) where no denial holds: of α_l among Σ α.
-pub fn probability(of_label: f64, all: f64, p0: f64) -> f64 {
-    (of_label + BASE * p0) / (all + BASE)
+/// (8–9): chance that two supports are called the same, by what was said of either: Σ_l α_l β_l, each over all
+/// that was said there and the base. What base measures share is chance, and no evidence.
+pub fn alike(of_a: f64, all_a: f64, of_b: f64, all_b: f64) -> f64 {
+    of_a / (all_a + BASE) * (of_b / (all_b + BASE))
 }
 
 /// What a statement says for what makes it as probable as `ratio` times anything, when ε of talk is false.

@@ -7,7 +7,9 @@ use crate::filter::labels::{Evidence, LabelId, Labels, Source};
 use crate::filter::particle::Particle;
 use crate::filter::second_look::gained;
 use crate::geometry::Pose2;
-use crate::language::act::{Analysis, Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction};
+use crate::language::act::{
+    Analysis, Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction,
+};
 use crate::language::{
     GroundPlace, Grounding, LandmarkBelief, Narrowing, Reading, Relation, ground_by_paper, ground_clause,
     pointed_to, seen_from_here,
@@ -139,8 +141,11 @@ impl Scene<'_> {
         for (said, readings) in clauses {
             let label = self.ledger.meant(said);
             let certainty = readings.iter().map(|r| r.0).sum::<f64>().min(1.0);
-            let Grounding { p, likelihood_ratio, .. } = self.place_of(&readings, label);
-            ratios.push((said, likelihood_ratio));
+            let grounding = self.place_of(&readings, label);
+            // Given all names, and of other descriptions those before: each pair is told once.
+            let before = |e: &Evidence| e.source != Source::Grounded || e.utterance < self.utterance;
+            ratios.push((said, grounding.likelihood_ratio_by(&self.applies(label, before))));
+            let p = grounding.p;
             grounded.extend(p.iter().enumerate().filter(|(_, p)| *p * certainty >= GROUNDED_MIN).map(
                 |(v, p)| {
                     let (utterance, place, weight) = (self.utterance, v as Vertex, certainty * p);
@@ -161,7 +166,7 @@ impl Scene<'_> {
             let of_first = landmarks[0].first().into_iter().flatten();
             let likeliest = of_first.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
             let p = ground_by_paper(clause[0].1.relation, &self.places, likeliest.map(|l| l.0));
-            return Grounding { p, p_elsewhere: 0.0, likelihood_ratio: 1.0 };
+            return Grounding { p, p_elsewhere: 0.0, likelihood_ratio: 1.0, ratios: Vec::new() };
         }
         let beliefs: Vec<Vec<LandmarkBelief>> = clause
             .iter()
@@ -180,7 +185,7 @@ impl Scene<'_> {
                 landmarks,
             })
             .collect();
-        ground_clause(&readings, &self.places, self.held, &self.applies(figure))
+        ground_clause(&readings, &self.places, self.held, &self.applies(figure, |_| true))
     }
 
     /// Where a landmark may be: (place, probability), summing to at most one; empty if nobody knows.
@@ -188,7 +193,7 @@ impl Scene<'_> {
         let mut p: Vec<f64> = match (&phrase.head, phrase.label()) {
             (Head::Here | Head::Agent | Head::Speaker | Head::Path, _) => return vec![(self.held, 1.0)],
             (_, Some(name)) => match self.ledger.label(name.as_str()) {
-                Some(label) => self.applies(label),
+                Some(label) => self.applies(label, |_| true),
                 None => Vec::new(),
             },
             _ => Vec::new(),
@@ -225,9 +230,9 @@ impl Scene<'_> {
         }
     }
 
-    /// P(name applies) at every place, by what other sentences said.
-    fn applies(&self, label: LabelId) -> Vec<f64> {
-        let applies = self.labels.applies_by_others(label, self.utterance);
+    /// P(name applies) at every place, by what other sentences said, those of them that count.
+    fn applies(&self, label: LabelId, counts: impl Fn(&Evidence) -> bool) -> Vec<f64> {
+        let applies = self.labels.applies_by_others(label, self.utterance, counts);
         (0..self.places.len() as Vertex).map(|v| applies.get(&v).copied().unwrap_or(0.0)).collect()
     }
 }
@@ -366,9 +371,12 @@ mod tests {
     }
 
     #[test]
-    fn a_description_speaks_for_the_map_in_which_it_is_true() {
+    fn a_sentence_speaks_for_the_map_in_which_it_is_true() {
         let nothing = weighed("the lounge is near the cafe");
         assert!(weighed("the kitchen is near the gym") > nothing + 0.5);
         assert!(weighed("the kitchen is twenty meters from the gym") < nothing - 1.0);
+        assert!(weighed("this is where we started") > nothing + 1.0);
+        assert!(weighed("this is not where we started") < nothing - 1.0);
+        assert!(weighed("this is the same place as the gym") > nothing + 1.0);
     }
 }

@@ -10,7 +10,7 @@
 
 use crate::edge::Vertex;
 use crate::filter::labels::LabelId;
-use crate::filter::naming::{BASE, BaseMeasure, REACH_M, Support, Tally, share, unless_false};
+use crate::filter::naming::{BASE, BaseMeasure, Near, REACH_M, Support, Tally, share, unless_false};
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
 use crate::language::act::Sameness;
@@ -27,62 +27,13 @@ const VISITED_BACK: Vertex = 12;
 /// Two successive places are hardly farther apart.
 const SPACING_MAX_M: f64 = 2.0;
 
-/// Places spoken of, where one particle has them: what is said of one holds for what lies near.
-struct Near {
-    sites: Vec<Pose2>,
-    cells: BTreeMap<(i64, i64), Vec<u32>>,
-}
-
-fn cell(pose: &Pose2) -> (i64, i64) {
-    ((pose.x_m / REACH_M).floor() as i64, (pose.y_m / REACH_M).floor() as i64)
-}
-
-impl Near {
-    fn new(sites: Vec<Pose2>) -> Self {
-        let mut cells: BTreeMap<(i64, i64), Vec<u32>> = BTreeMap::new();
-        for (k, site) in sites.iter().enumerate() {
-            cells.entry(cell(site)).or_default().push(k as u32);
-        }
-        Self { sites, cells }
-    }
-}
-
-impl Support for Near {
-    fn joined(&self, here: usize, mut each: impl FnMut(usize, f64)) {
-        let at = &self.sites[here];
-        let (x, y) = cell(at);
-        let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy)));
-        for &k in around.filter_map(|c| self.cells.get(&c)).flatten() {
-            let distance_m = at.distance_m(&self.sites[k as usize]);
-            if distance_m < REACH_M {
-                each(k as usize, share(distance_m));
-            }
-        }
-    }
-}
-
 /// log p(λ_1 … λ_n | G, X, L), relative to sentences that say nothing.
 pub fn log_likelihood(talk: &Talk, particle: &Particle) -> f64 {
-    let standing: Vec<(&Testimony, Vec<Units>)> =
-        talk.testimonies.iter().filter(|t| talk.stands(t.utterance)).map(|t| (t, talk.units(t))).collect();
+    let standing = talk.standing();
     if standing.is_empty() {
         return 0.0;
     }
-    let mut base = BaseMeasure::new(talk.ledger.names().len());
-    let mut numbers = BTreeMap::new();
-    let mut sites = Vec::new();
-    for units in standing.iter().flat_map(|(_, units)| units) {
-        base.count(units.label, units.tally.said);
-        if let Some(pose) = talk.testimonies.pose(particle, units.place) {
-            numbers.entry(units.place).or_insert_with(|| {
-                sites.push(pose);
-                sites.len() - 1
-            });
-        }
-    }
-    let told = vec![Vec::new(); sites.len()];
-    let joined = Joined::of(talk.ledger.names().len());
-    let mut fold = Fold { talk, particle, base, numbers, near: Near::new(sites), told, joined };
+    let mut fold = Fold::new(talk, particle, &standing);
     let log_ratios = standing.iter().map(|(t, units)| {
         let ratio = fold.ratio(t, units);
         fold.hear(units);
@@ -100,8 +51,10 @@ struct Units {
 }
 
 impl Talk {
-    fn stands(&self, utterance: u32) -> bool {
-        self.ledger.entries().get(utterance as usize).is_some_and(|e| e.stands)
+    /// What was not taken back, and what it says of names.
+    fn standing(&self) -> Vec<(&Testimony, Vec<Units>)> {
+        let stands = |u: u32| self.ledger.entries().get(u as usize).is_some_and(|e| e.stands);
+        self.testimonies.iter().filter(|t| stands(t.utterance)).map(|t| (t, self.units(t))).collect()
     }
 
     /// What a name as said in an utterance means, unless it was forgotten since.
@@ -186,10 +139,31 @@ struct Fold<'a> {
     joined: Joined,
 }
 
-impl Fold<'_> {
+impl<'a> Fold<'a> {
+    /// Nothing heard yet, but p₀ known of all that will be.
+    fn new(talk: &'a Talk, particle: &'a Particle, standing: &[(&Testimony, Vec<Units>)]) -> Self {
+        let names = talk.ledger.names().len();
+        let mut base = BaseMeasure::new(names);
+        let (mut numbers, mut sites) = (BTreeMap::new(), Vec::new());
+        for units in standing.iter().flat_map(|(_, units)| units) {
+            base.count(units.label, units.tally.said);
+            if let Some(pose) = talk.testimonies.pose(particle, units.place) {
+                numbers.entry(units.place).or_insert_with(|| {
+                    sites.push(pose);
+                    sites.len() - 1
+                });
+            }
+        }
+        let told = vec![Vec::new(); sites.len()];
+        Self { talk, particle, base, numbers, near: Near::new(sites), told, joined: Joined::of(names) }
+    }
+
     fn hear(&mut self, units: &[Units]) {
         for Units { place, label, tally } in units {
             let Some(&site) = self.numbers.get(place) else { continue };
+            if self.told[site].is_empty() {
+                self.near.tell(site);
+            }
             match self.told[site].iter_mut().find(|(l, _)| l == label) {
                 Some((_, known)) => known.add(*tally, 1.0),
                 None => self.told[site].push((*label, *tally)),

@@ -23,6 +23,8 @@ const GROUNDED_TOLD: usize = 5;
 const TOPIC_NS: i64 = 60_000_000_000;
 /// Less is "not seen yet".
 const NOT_SEEN_MAX: f64 = 0.3;
+/// A place that nobody can tell.
+const WHICH: &str = " But I can't tell which place that is: say it when we are there.";
 /// So near is "here".
 const HERE_M: f64 = 2.0;
 /// Directions from a robot's nose, by eighths to the left.
@@ -148,14 +150,22 @@ fn unplaced(parse: &Parse) -> &'static str {
     let of = |content: &Content| match content {
         Content::Label { what, .. } if what.label().is_none() => Some(" But I can keep no name of that."),
         Content::Label { at: Phrase { head: Head::Any | Head::Visited | Head::Place, .. }, .. } => {
-            Some(" But I can't tell which place that is: say it when we are there.")
+            Some(WHICH)
         }
+        Content::Same { what, like, .. } if !can_be_compared(what, like) => Some(WHICH),
         Content::Locate(l) if l.figure.head == Head::It => {
             Some(" But I don't know what you speak of: name it.")
         }
         _ => None,
     };
     parse.acts().iter().find_map(|act| of(&act.content)).unwrap_or_default()
+}
+
+/// Whether two places said to be one, or not, can be told: one is pointed to, and the other too, or it has a name.
+fn can_be_compared(what: &Phrase, like: &Phrase) -> bool {
+    let pointed = |p: &Phrase| matches!(p.head, Head::Here | Head::It | Head::Previous | Head::Start);
+    let known = |p: &Phrase| pointed(p) || p.head == Head::Visited || p.label().is_some();
+    pointed(what) && known(like) || pointed(like) && known(what)
 }
 
 fn heard(u: &Utterance, status: HeardStatus, parse: &Parse, words: String) -> Heard {

@@ -243,6 +243,30 @@ proptest! {
         prop_assert!((fold(&said) - fold(&by_group)).abs() < 1e-6);
     }
 
+    /// What may be said next of a place is a distribution over all names, said, denied or never said.
+    #[test]
+    fn what_is_said_next_is_a_distribution(
+        said in prop::collection::vec((0_u32..12, 0_u32..6, any::<bool>()), 1..30), at in 0_usize..30,
+    ) {
+        let map = map(&(0..12).map(|v| 1.5 * f64::from(v)).collect::<Vec<_>>());
+        let mut talk = Talk::default();
+        (0..7).for_each(|k| { talk.name(k); });
+        for &(place, said, so) in &said {
+            talk.claim(&map, &[if so { called(place, said) } else { Claim::Denied { place, said } }]);
+        }
+        let standing = talk.standing();
+        let mut fold = Fold::new(&talk, &map, &standing);
+        standing.iter().for_each(|(_, units)| fold.hear(units));
+        let place = said[at % said.len()].0;
+        let mut p = |said| {
+            let ratio = fold.called(u32::MAX, (place, said), Sameness::Open, &[]);
+            ratio * fold.base.probability(said, &[])
+        };
+        // Name 6 is one of 144 that nobody has said.
+        let sum = (0..6).map(&mut p).sum::<f64>() + 144.0 * p(6);
+        prop_assert!((sum - 1.0).abs() < 1e-9, "{sum}");
+    }
+
     /// Assertion and denial of one name in one room weigh the same whichever comes first.
     #[test]
     fn a_denial_may_come_before_what_it_denies(x_m in 0.0..30.0_f64) {
@@ -284,7 +308,9 @@ fn fold_s(sentences: u32, spread_m: f64) -> f64 {
     let x_m: Vec<f64> = (0..sentences).map(|k| f64::from(k * 7919 % sentences) * spread_m).collect();
     let map = map(&x_m);
     let mut talk = Talk::default();
-    (0..60).for_each(|k| { talk.name(k); });
+    (0..60).for_each(|k| {
+        talk.name(k);
+    });
     for k in 0..sentences {
         talk.claim(&map, &[called(k, k * 31 % 60)]);
     }
