@@ -23,7 +23,7 @@ pub const LOOKS: [f64; 4] = [1.92, -1.88, 1.17, -1.74];
 /// V: the area in which a pair is searched, m².
 const SEARCHED_M2: f64 = 400.0;
 /// ν: copies of a stretch, as far as scans can tell, in such an area …
-const COPIES: f64 = 0.8;
+const COPIES: f64 = 2.0;
 /// … and π_m: their headings, by quarter turns.
 const TURNED: [f64; 4] = [0.7, 0.1, 0.1, 0.1];
 /// Shares of contradicted points by which they are scaled, and below which they are not known to be.

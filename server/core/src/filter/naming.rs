@@ -21,15 +21,18 @@ pub type LabelId = u32;
 
 /// ε: one sentence in ten is false, misheard, or put where it does not belong.
 pub const FALSE_TALK: f64 = 0.1;
-/// α₀: total concentration of the names not said.
-pub const BASE: f64 = 1.0;
+/// α₀: total concentration of the names not said: the paper's α. One utterance leaves one chance in six that the
+/// next calls the place something else.
+pub const BASE: f64 = 0.2;
 /// Concentration against a name that was said: one utterance leaves ε of doubt.
 const DOUBT: f64 = FALSE_TALK / (1.0 - FALSE_TALK);
 /// Names people may use of a place before any was said: the size of the lexicon, about.
 const NAMES: f64 = 150.0;
+/// So many of them are what a way is called: every building has hallways, and one is called like the other.
+const WAYS: f64 = 20.0;
 /// How near two places are for what is said of one to be expected of the other: standard deviation
 /// of a Gaussian kernel, the size of a room.
-const JOINED_M: f64 = 4.0;
+const JOINED_M: f64 = 3.0;
 
 /// Over what a name holds: which sites share what is said of them.
 pub trait Support {
@@ -161,6 +164,12 @@ impl BaseMeasure {
     /// Of so many names in the ledger, none said yet.
     pub fn new(names: usize) -> Self {
         Self { times: vec![0.0; names], all: 0.0, names: NAMES.max(names as f64 + 1.0) }
+    }
+
+    /// A name is one of ways.
+    pub fn is_of_ways(&mut self, label: LabelId) {
+        self.times[label as usize] += WAYS;
+        self.all += WAYS;
     }
 
     /// A name was said, with a probability.

@@ -13,6 +13,7 @@ use crate::filter::labels::LabelId;
 use crate::filter::naming::{BASE, BaseMeasure, Near, REACH_M, Support, Tally, share, unless_false};
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
+use crate::language::Name;
 use crate::language::act::Sameness;
 use crate::talk::Talk;
 use crate::talk::claims::{Claim, Claims, Testimony};
@@ -20,6 +21,8 @@ use std::collections::BTreeMap;
 
 /// How often two places spoken of lie in one room by chance: a room of some floor.
 const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
+/// "The hallway again" and "back in the lobby" mean another of the kind so often.
+const OF_ITS_KIND: [f64; 2] = [0.9, 0.3];
 /// How often a place has been seen before when somebody speaks of it.
 const VISITED_BY_CHANCE: f64 = 0.3;
 /// Places so far back along the path are no visit before.
@@ -55,6 +58,11 @@ impl Talk {
     fn standing(&self) -> Vec<(&Testimony, Vec<Units>)> {
         let stands = |u: u32| self.ledger.entries().get(u as usize).is_some_and(|e| e.stands);
         self.testimonies.iter().filter(|t| stands(t.utterance)).map(|t| (t, self.units(t))).collect()
+    }
+
+    /// Whether a name is that of a way, such as every building has.
+    fn is_way(&self, label: LabelId) -> bool {
+        Name::new(self.ledger.name(label)).is_some_and(|name| name.is_way())
     }
 
     /// What a name as said in an utterance means, unless it was forgotten since.
@@ -144,6 +152,7 @@ impl<'a> Fold<'a> {
     fn new(talk: &'a Talk, particle: &'a Particle, standing: &[(&Testimony, Vec<Units>)]) -> Self {
         let names = talk.ledger.names().len();
         let mut base = BaseMeasure::new(names);
+        (0..names as LabelId).filter(|&label| talk.is_way(label)).for_each(|label| base.is_of_ways(label));
         let (mut numbers, mut sites) = (BTreeMap::new(), Vec::new());
         for units in standing.iter().flat_map(|(_, units)| units) {
             base.count(units.label, units.tally.said);
@@ -218,7 +227,12 @@ impl<'a> Fold<'a> {
                 unless_false(predicted / joined.total(p0) / p0(label))
             }
             // "Back in the lobby": it was called so before.
-            Sameness::Same => unless_false(tally.concentration() / joined.total(p0) / p0(label)),
+            Sameness::Same => {
+                let called_so = tally.concentration() / joined.total(p0) / p0(label);
+                let open = called_so + BASE * tally.left() / joined.total(p0);
+                let kind = OF_ITS_KIND[usize::from(!self.talk.is_way(label))];
+                unless_false(kind * open + (1.0 - kind) * called_so)
+            }
             // "Another lobby": it was not.
             Sameness::Other => unless_false(1.0 - tally.applies()),
         }
