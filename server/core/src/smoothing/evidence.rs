@@ -42,9 +42,9 @@ impl AddAssign for Sums {
 }
 
 impl Sums {
-    /// A factor with an error.
-    pub fn of_factor(error: &Vector3<f64>, information: &Matrix3<f64>) -> Self {
-        Self { chi2: error.dot(&(information * error)), log_weight: half_log_det(information) }
+    /// A factor with an error, and its `½ log|Ω/2π|`.
+    pub fn of_factor(error: &Vector3<f64>, information: &Matrix3<f64>, log_weight: f64) -> Self {
+        Self { chi2: error.dot(&(information * error)), log_weight }
     }
 
     /// Eliminates a pose of which so much is known: its block of Λ, and η there.
@@ -61,7 +61,7 @@ impl Sums {
 }
 
 /// `½ log|M/2π|` of an information matrix.
-fn half_log_det(m: &Matrix3<f64>) -> f64 {
+pub(super) fn half_log_det(m: &Matrix3<f64>) -> f64 {
     let diagonal = m.cholesky().map_or_else(Matrix3::zeros, |c| c.l()).diagonal();
     diagonal.product().ln() - 1.5 * TAU.ln()
 }
@@ -108,7 +108,8 @@ impl Belief {
             match &structure.entries[*id as usize] {
                 Entry::Between(f, z) if self.has(structure, *id) => {
                     let [at_i, at_j] = self.points_of(f);
-                    sums += Sums::of_factor(&residual(z, &at_i, &at_j).error, &f.information);
+                    let error = residual(z, &at_i, &at_j).error;
+                    sums += Sums::of_factor(&error, &f.information, structure.log_weights[*id as usize]);
                 }
                 Entry::Prior(poses) => {
                     let prior = self.prior(*id);

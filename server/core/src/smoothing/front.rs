@@ -21,10 +21,14 @@ use crate::smoothing::kernels::{
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Where a pose keeps less than this share of its diagonal, what it keeps is rounding for a good
 /// part: such a front is better eliminated by QR.
 const KEPT_MIN: f64 = 1e-10;
+
+/// Products of pivots that those of three more leave finite and digits of.
+const PIVOTS: Range<f64> = 1e-100..1e100;
 
 /// Numbers of one clique for one belief.
 #[derive(Clone, Debug)]
@@ -247,14 +251,20 @@ impl Front {
 
     /// What the frontals' elimination adds to the evidence: `−dᵀd` and `−½ log|L Lᵀ/2π|`.
     pub fn eliminated(&self) -> Sums {
-        let mut sums = Sums::default();
+        let mut sums = Sums { chi2: 0.0, log_weight: 1.5 * TAU.ln() * self.frontals as f64 };
+        // As few logarithms as the range of numbers allows.
+        let mut pivots = 1.0_f64;
         for j in 0..self.frontals {
-            let diagonal = self.diagonal(j);
-            sums.log_weight += 1.5 * TAU.ln() - (diagonal[0] * diagonal[1] * diagonal[2]).ln();
-            for d in self.columns(j).map(|column| column[column.len() - 1]) {
-                sums.chi2 -= d * d;
+            let [c0, c1, c2] = self.columns(j);
+            let last = c0.len() - 1;
+            sums.chi2 -= c0[last] * c0[last] + c1[last] * c1[last] + c2[last] * c2[last];
+            pivots *= c0[0] * c1[1] * c2[2];
+            if !PIVOTS.contains(&pivots) {
+                sums.log_weight -= pivots.ln();
+                pivots = 1.0;
             }
         }
+        sums.log_weight -= pivots.ln();
         sums
     }
 

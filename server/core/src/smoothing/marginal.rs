@@ -53,7 +53,7 @@ impl System {
             match entry {
                 Entry::Between(f, z) => {
                     let r = residual(z, &at(f.i), &at(f.j));
-                    sums += Sums::of_factor(&r.error, &f.information);
+                    sums += Sums::of_factor(&r.error, &f.information, structure.log_weights[*id as usize]);
                     system.add(&Self::of_factor(&r.weighted(&f.information)), &places);
                 }
                 Entry::Prior(of) => {

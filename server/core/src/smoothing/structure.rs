@@ -1,6 +1,7 @@
 //! What all particles share: poses, factors, and the tree's shape.
 
 use crate::geometry::Pose2;
+use crate::smoothing::evidence::half_log_det;
 use crate::smoothing::factor::{At, checked_information};
 use crate::smoothing::tree::{Entry, Tree};
 use crate::smoothing::{Factor, FactorId, SmoothError};
@@ -19,6 +20,8 @@ pub struct Structure {
     pub(super) starts: Vec<FactorId>,
     /// Who holds a factor.
     pub(super) holders: Vec<Holders>,
+    /// What a factor adds to the evidence where it does not err, nats; none what a pose left.
+    pub(super) log_weights: Vec<f64>,
     /// Factors of each pose.
     pub(super) of_pose: Vec<Vec<FactorId>>,
     /// How much the factors of each pose mind that it turns.
@@ -182,8 +185,7 @@ impl Structure {
             self.of_pose[p as usize].push(id);
         }
         let z = At::new(factor.i_from_j);
-        self.entries.push(Entry::Between(factor, z));
-        self.holders.push(Holders::Others(tight));
+        self.push_row(Entry::Between(factor, z), Holders::Others(tight));
         self.tree.stand_in(tight);
         Ok(tight)
     }
@@ -314,11 +316,19 @@ impl Structure {
             self.of_pose[p as usize].push(id);
             self.touched.push(p);
         }
-        self.entries.push(entry);
-        self.holders.push(holders);
+        self.push_row(entry, holders);
         self.tree.clique_of_factor.push(super::tree::NONE);
         self.new_factors.push(id);
         id
+    }
+
+    fn push_row(&mut self, entry: Entry, holders: Holders) {
+        self.log_weights.push(match &entry {
+            Entry::Between(factor, _) => half_log_det(&factor.information),
+            _ => 0.0,
+        });
+        self.entries.push(entry);
+        self.holders.push(holders);
     }
 
     fn remove(&mut self, id: FactorId) -> Entry {

@@ -15,7 +15,9 @@ const WHEELS: Sigma = (0.02, 0.008);
 fn city(seed: u64) -> (Structure, Belief, Vec<u32>) {
     let mut s = manhattan(seed, 150, 30, WHEELS);
     let ids: Vec<u32> = s.loops.iter().map(|(id, _)| *id).collect();
-    ids.iter().for_each(|&id| s.smoother.release(id));
+    for &id in &ids {
+        s.smoother.release(id);
+    }
     s.smoother.settle().unwrap();
     (s.smoother.structure().clone(), s.smoother.belief().clone(), ids)
 }
@@ -109,7 +111,7 @@ fn a_tight_factor_is_as_likely_as_what_is_seen_from_it() {
 #[test]
 fn evidence_of_what_fails_is_none() {
     let mut s = Script::new(1);
-    assert_eq!(s.smoother.log_evidence(), 0.0);
+    assert!(s.smoother.log_evidence().abs() < 1e-12);
     for _ in 0..9 {
         s.wander();
     }
@@ -126,5 +128,5 @@ fn evidence_of_what_fails_is_none() {
     let far = Factor { i: 0, j: 9, i_from_j: Pose2::new(1e12, 0.0, 0.0), information: 1e300 * r };
     s.smoother.add_factor(far).unwrap();
     assert!(s.smoother.update().is_err());
-    assert_eq!(s.smoother.log_evidence(), f64::NEG_INFINITY);
+    assert!(s.smoother.log_evidence() < f64::MIN);
 }
