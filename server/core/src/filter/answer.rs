@@ -45,14 +45,13 @@ pub enum Stance {
     },
 }
 
-/// Where a particle stands, from what it thinks of the fit; `others` are the questions about the same old
-/// path.
+/// Where a particle stands, from what it thinks of the fit; `others` are the other questions.
 pub fn stance<'a>(
     particle: &Particle,
     edge: &Edge,
     testimony: &Testimony,
     judgement: Option<Judgement>,
-    mut others: impl Iterator<Item = &'a Question>,
+    others: impl Iterator<Item = &'a Question>,
 ) -> Stance {
     let Some(Judgement { log_there, distance2, known, lets_go }) = judgement else { return Stance::Elsewhere };
     if particle.refused.contains(&testimony.question) {
@@ -68,9 +67,10 @@ pub fn stance<'a>(
     let (here, there) = (pose(edge.j), pose(edge.i).compose(&edge.i_from_j));
     let says_same = |q: &Question| {
         let there_by_q = pose(q.i).compose(&q.i_from_j).compose(&pose(q.j).between(&here));
-        particle.refused.contains(&q.id) && same(&there, &there_by_q)
+        same(&there, &there_by_q)
     };
-    if others.any(says_same) { Stance::Again } else { Stance::Open { log_there, lets_go } }
+    let mut refused = others.filter(|q| particle.refused.contains(&q.id));
+    if refused.any(says_same) { Stance::Again } else { Stance::Open { log_there, lets_go } }
 }
 
 /// Whether two poses are one answer.

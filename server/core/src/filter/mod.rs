@@ -260,7 +260,7 @@ impl Filter {
         let Self { graph, structure, questions, .. } = self;
         let of = |p: &Particle| {
             let judgement = judge(graph, structure, p, edge);
-            let others = questions.about(graph, edge.i).filter(|q| q.id != testimony.question);
+            let others = questions.iter().filter(|q| q.id != testimony.question);
             (stance(p, edge, testimony, judgement, others), judgement)
         };
         self.particles.par_iter().map(of).collect::<Vec<_>>().into_iter().unzip()

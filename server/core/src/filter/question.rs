@@ -73,9 +73,9 @@ impl Questions {
         Testimony { question: id, log_looks, gained: log_looks - known }
     }
 
-    /// Questions of the old path around place `i`, the last seen first.
-    pub fn about<'a>(&'a self, graph: &'a Graph, i: Vertex) -> impl Iterator<Item = &'a Question> {
-        self.remembered.iter().filter(move |q| !graph.apart(q.i, i, SAME_PATH_M))
+    /// All that are remembered, the last seen first.
+    pub fn iter(&self) -> impl Iterator<Item = &Question> {
+        self.remembered.iter()
     }
 
     /// Whether a fit may still come that belongs to a question.
