@@ -10,7 +10,7 @@
 //! edge not at all: places that an edge joins lie near one another.
 
 use crate::edge::Vertex;
-use crate::filter::labels::{Evidence, LabelId, Source};
+use crate::filter::labels::{Evidence, LabelId, Source, take_up};
 use crate::filter::naming::{Spoken, share};
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
@@ -106,13 +106,15 @@ impl Map {
         spoken
     }
 
-    /// Places with evidence, the likeliest by themselves.
+    /// Places with evidence, the likeliest first by what is said of themselves: where the name was given, rather
+    /// than in the midst of what joins there.
     fn sites(&self) -> Vec<Vertex> {
-        let mut most: BTreeMap<Vertex, f64> = BTreeMap::new();
-        for e in self.evidence.values().flatten().filter(|e| e.weight > 0.0) {
-            *most.entry(e.place).or_insert(0.0) += e.weight;
+        let mut own: BTreeMap<Vertex, Spoken> = BTreeMap::new();
+        for e in self.evidence.values().flatten() {
+            take_up(own.entry(e.place).or_default(), e);
         }
-        let mut sites: Vec<(Vertex, f64)> = most.into_iter().collect();
+        let sites = own.into_iter().map(|(v, spoken)| (v, spoken.applies()));
+        let mut sites: Vec<(Vertex, f64)> = sites.filter(|s| s.1 > 0.0).collect();
         sites.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
         sites.truncate(SITES_MAX);
         sites.into_iter().map(|s| s.0).collect()
@@ -120,15 +122,8 @@ impl Map {
 
     /// Adds the regions that this map has and no map before.
     fn find(&self, regions: &mut Vec<Region>, p_min: f64) {
-        let new: Vec<Vertex> = self.sites().into_iter().filter(|&v| !self.is_in(regions, v)).collect();
-        let mut sites: Vec<(Vertex, f64)> = new
-            .into_iter()
-            .map(|v| (v, self.spoken(v).applies()))
-            .filter(|s| self.weight * s.1 >= p_min)
-            .collect();
-        sites.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-        for (place, _) in sites {
-            if !self.is_in(regions, place) {
+        for place in self.sites() {
+            if !self.is_in(regions, place) && self.weight * self.spoken(place).applies() >= p_min {
                 regions.push(Region { place, p_is: 0.0, probability: 0.0 });
             }
         }

@@ -57,7 +57,7 @@ impl Evidence {
 }
 
 /// Adds a Δα to what speaks for its name.
-fn take_up(spoken: &mut Spoken, e: &Evidence) {
+pub fn take_up(spoken: &mut Spoken, e: &Evidence) {
     match e.source {
         Source::Grounded => spoken.undescribed *= 1.0 - e.weight.clamp(0.0, 1.0),
         Source::Denied => spoken.tally.denied -= e.weight,
