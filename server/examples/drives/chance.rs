@@ -138,9 +138,13 @@ fn drifted(drive: &Drive, building: usize, drift_m: f64) -> Vec<Weighed> {
             loops = Loops::default();
         }
         let truth = |i: Vertex| drive.truth[i as usize].between(&drive.truth[t as usize]);
+        let pose = |i: Vertex| {
+            let true_pose = drive.truth[i as usize];
+            if i == t { true_pose.compose(&off) } else { true_pose }
+        };
         let predicted = |i: Vertex| Relative { i, i_from_a: truth(i).compose(&off), covariance };
         let within_m = NEAR_M + 3.0 * drift_m.min(LOST_SIGMA_M);
-        let near = (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M) && !loops.covers(&graph, i));
+        let near = (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M) && !loops.covers(&graph, i, t, pose));
         let near: Vec<Proposal> = near
             .map(predicted)
             .filter(|r| r.i_from_a.x_m.hypot(r.i_from_a.y_m) < within_m)

@@ -11,10 +11,15 @@
 //! says nothing. Neighbouring places show the same walls: floors are paid for once.
 
 use crate::edge::Vertex;
+use crate::filter::loops::SCORE_MIN;
 use crate::filter::particle::Particle;
-use crate::graph::Graph;
-use crate::smoothing::{Relative, Structure};
+use crate::filter::propose::SPREAD_M;
 use crate::geometry::Pose2;
+use crate::graph::Graph;
+use crate::scan::agree::agreement;
+use crate::scan::view::Closeness;
+use crate::smoothing::{Relative, Structure};
+use crate::track::front::LOCAL_PATH_M;
 
 /// p_D of a single pair within [`OVERLAP_M`] of each other, by the search.
 const FOUND: f64 = 0.8;
@@ -27,6 +32,16 @@ const EXPECTED_M: f64 = 0.5;
 const EXPECTED_RAD: f64 = 0.1;
 /// So many standard deviations of the spread.
 const SIGMAS: f64 = 3.0;
+/// c₁ and c₀: how often places contradict each other that lie so, and that do not.
+const CONTRADICTED: (f64, f64) = (0.04, 0.6);
+/// Older places compared, so near in the map.
+const COMPARED_MAX: usize = 3;
+const COMPARED_M: f64 = 5.0;
+/// How certain the relative pose must be for that.
+const COMPARED_SIGMA_MAX_M: f64 = 0.3;
+const COMPARED_SIGMA_MAX_RAD: f64 = 0.05;
+/// Points that must be seen or seen through for an outcome.
+const COMPARED_MIN: u32 = 20;
 /// Path that shows the same walls, metres.
 const SAME_WALLS_M: f64 = 5.0;
 
@@ -43,7 +58,8 @@ pub fn pay(
     if particle.missed_at_m.is_some_and(|at_m| path_m - at_m < SAME_WALLS_M) {
         return 0.0;
     }
-    let log = log_missed(graph, structure, particle, t, looked);
+    let log = log_missed(graph, structure, particle, t, looked)
+        .min(log_contradicted(graph, structure, particle, t));
     if log < -0.1 {
         particle.missed_at_m = Some(path_m);
     }
@@ -74,6 +90,43 @@ fn log_missed(
         expected = expected.max(overlap);
     }
     (1.0 - FOUND * expected).ln()
+}
+
+/// log c₁/c₀ if the scans contradict where the particle is certain that places lie over one another, else 0.
+fn log_contradicted(graph: &Graph, structure: &Structure, particle: &Particle, t: Vertex) -> f64 {
+    let near = nearest(graph, t, |v| particle.belief.pose(v));
+    let Ok(predicted) = particle.belief.relative(structure, t, &near) else { return 0.0 };
+    let contradicts = |r: &Relative| {
+        let (sigma_m, sigma_rad) = (r.sigma_m(), r.sigma_rad());
+        if sigma_m > COMPARED_SIGMA_MAX_M || sigma_rad > COMPARED_SIGMA_MAX_RAD {
+            return false;
+        }
+        let look = Closeness {
+            tolerance_m: Closeness::CLOSE.tolerance_m + 2.0 * sigma_m,
+            tolerance_per_m: Closeness::CLOSE.tolerance_per_m + 2.0 * sigma_rad,
+            ..Closeness::BRIEF
+        };
+        let both = agreement(&graph.place(r.i).content, &graph.place(t).content, &r.i_from_a, &look);
+        both.agree + both.conflict >= COMPARED_MIN && both.score() < SCORE_MIN
+    };
+    if predicted.iter().any(contradicts) { (CONTRADICTED.0 / CONTRADICTED.1).ln() } else { 0.0 }
+}
+
+/// The older places nearest to place `t` in a map, spread along the path.
+fn nearest(graph: &Graph, t: Vertex, pose: impl Fn(Vertex) -> Pose2) -> Vec<Vertex> {
+    let here = pose(t);
+    let mut near: Vec<(f64, Vertex)> = (0..t)
+        .map(|i| (pose(i).distance_m(&here), i))
+        .filter(|&(d, i)| d < COMPARED_M && graph.apart(i, t, LOCAL_PATH_M))
+        .collect();
+    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    let mut chosen: Vec<Vertex> = Vec::with_capacity(COMPARED_MAX);
+    for (_, i) in near {
+        if chosen.len() < COMPARED_MAX && chosen.iter().all(|&c| graph.apart(c, i, SPREAD_M)) {
+            chosen.push(i);
+        }
+    }
+    chosen
 }
 
 /// P(o): that the two places lie within [`OVERLAP_M`] of each other along either axis.

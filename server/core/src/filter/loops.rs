@@ -36,8 +36,11 @@ const FOLLOW_NEAR_M: f64 = 3.0;
 pub const AGREE_M: f64 = 0.3;
 /// The same for headings.
 pub const AGREE_RAD: f64 = 0.06;
+/// A map has a place where a fit has it within so much.
+const COVERED_M: f64 = 1.0;
+const COVERED_RAD: f64 = 0.17;
 /// Fits followed at a time.
-const FOLLOWED_MAX: usize = 8;
+const FOLLOWED_MAX: usize = 12;
 /// Fits without enough support that are looked into at a time, the best first.
 const UNSUPPORTED_AT_ONCE: usize = 4;
 /// Pairs matched at a time …
@@ -128,9 +131,16 @@ struct Lead {
 }
 
 impl Loops {
-    /// Whether an older place lies on a stretch that is being followed.
-    pub fn covers(&self, graph: &Graph, i: Vertex) -> bool {
-        self.followed.iter().any(|f| !graph.apart(f.i, i, FOLLOW_REACH_M))
+    /// Whether an older place lies on a stretch that is being followed to place `t`, in a map that has both as
+    /// the fit does: where a map does not, the next identical door may be the one.
+    pub fn covers(&self, graph: &Graph, i: Vertex, t: Vertex, pose: impl Fn(Vertex) -> Pose2) -> bool {
+        let Some(before) = t.checked_sub(1) else { return false };
+        let moved = graph.chained(before, t);
+        let is_there = |f: &Fit| {
+            let off = pose(f.i).compose(&f.mode.i_from_j).compose(&moved).between(&pose(t));
+            off.x_m.hypot(off.y_m) < COVERED_M && off.yaw_rad.abs() < COVERED_RAD
+        };
+        self.followed.iter().any(|f| !graph.apart(f.i, i, FOLLOW_REACH_M) && is_there(f))
     }
 
     /// Matches place `t` with the proposed places and along what is being followed.

@@ -37,7 +37,7 @@ use crate::filter::weigh::{Judgement, judge};
 use crate::filter::words::Words;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
-use crate::smoothing::{FactorId, SmoothError, Structure};
+use crate::smoothing::{Belief, FactorId, SmoothError, Structure};
 use crate::track::front::{Chain, FrozenPlace};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
@@ -218,7 +218,7 @@ impl Filter {
 
     /// The union of what the particles would look at, one entry per older place, in order.
     fn propose(&self, t: Vertex) -> Vec<Proposal> {
-        let followed = |i: Vertex| self.loops.covers(&self.graph, i);
+        let followed = |b: &Belief, i: Vertex| self.loops.covers(&self.graph, i, t, |v| b.pose(v));
         let per_particle: Vec<Vec<Proposal>> = self
             .particles
             .par_iter()

@@ -77,7 +77,7 @@ pub fn propose(
     structure: &Structure,
     particle: &Particle,
     t: Vertex,
-    followed: impl Fn(Vertex) -> bool,
+    followed: impl Fn(&Belief, Vertex) -> bool,
 ) -> Vec<Proposal> {
     let belief = &particle.belief;
     let marginal = belief.marginal(structure, t);
@@ -87,7 +87,7 @@ pub fn propose(
         return Vec::new();
     }
     let older = (0..t).filter(|&i| {
-        graph.apart(i, t, LOCAL_PATH_M) && !graph.place(i).content.is_bare() && !followed(i)
+        graph.apart(i, t, LOCAL_PATH_M) && !graph.place(i).content.is_bare() && !followed(belief, i)
     });
     let lost = is_lost(graph, structure, belief, t);
     let here = belief.pose(t);
