@@ -124,6 +124,8 @@ pub struct FrontEnd {
     in_map: Drift,
     /// What the pose relative to the last place is off by.
     since_place: Drift,
+    /// φ of the path since the last place.
+    failed: f64,
     /// Odometry broke: the next scan begins a new local map.
     broken: bool,
     /// The local map was begun anew: the next place is tied to the last by next to nothing.
@@ -152,6 +154,7 @@ impl FrontEnd {
             rough_m: SIGMA_M,
             in_map: Drift::default(),
             since_place: Drift::default(),
+            failed: FAILED_MIN,
             broken: false,
             fresh: false,
             keys: VecDeque::new(),
@@ -159,6 +162,11 @@ impl FrontEnd {
             dark: None,
             local: None,
         }
+    }
+
+    /// What happened since the last place may be something else than what is said of it, with a probability.
+    pub(crate) fn doubt(&mut self, failed: f64) {
+        self.failed = self.failed.max(failed);
     }
 
     /// Odometry restarted or jumped: the next increment means nothing.
@@ -296,7 +304,7 @@ impl FrontEnd {
         // Systematic errors in the dark add up over all of it, and are dealt out once it is over.
         let driven = if in_the_dark { self.since_place.noise } else { self.since_place() };
         let information = (driven + bend).try_inverse().unwrap_or_else(Matrix3::identity);
-        let chain = Chain { previous_from_this, information, broken, failed: FAILED_MIN };
+        let chain = Chain { previous_from_this, information, broken, failed: std::mem::replace(&mut self.failed, FAILED_MIN) };
         self.open.push_back(OpenPlace {
             id: self.next_place,
             stamp_ns,

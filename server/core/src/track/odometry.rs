@@ -12,6 +12,13 @@ const SPEED_MAX_M_S: f64 = 5.0;
 /// A step this long needs no excuse of time: logs skip, stamps lie.
 const STEP_MAX_M: f64 = 2.0;
 
+/// After so long a silence, odometry that is at its origin again was restarted.
+const SILENCE_S: f64 = 1.0;
+
+fn is_near(a: &Pose2, b: &Pose2) -> bool {
+    a.distance_m(b) < 0.5 && a.between(b).yaw_rad.abs() < 0.3
+}
+
 /// Recent odometry, in the order of arrival.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Odometry {
@@ -39,7 +46,10 @@ impl Odometry {
             Some((stamp_ns, last)) => {
                 let dt_s = odom.stamp_ns.saturating_sub(*stamp_ns).max(0) as f64 * 1e-9;
                 let d_m = last.distance_m(&odom.odom_from_body);
-                if d_m > STEP_MAX_M + SPEED_MAX_M_S * dt_s {
+                let origin = Pose2::default();
+                if is_near(&odom.odom_from_body, &origin) && d_m > STEP_MAX_M && dt_s > SILENCE_S {
+                    Step::Broken(format!("odometry begins anew after {dt_s:.1} s of silence"))
+                } else if d_m > STEP_MAX_M + SPEED_MAX_M_S * dt_s {
                     Step::Broken(format!("odometry jumped by {d_m:.1} m in {dt_s:.2} s"))
                 } else {
                     Step::Continued
@@ -111,6 +121,8 @@ mod tests {
         o.push(&odom(0, 0.0, 0));
         assert!(matches!(o.push(&odom(1_000_000, 9.0, 0)), Step::Broken(_)));
         assert!(matches!(o.push(&odom(2_000_000, 9.0, 1)), Step::Broken(_)));
-        assert!((o.at(0).unwrap().x_m - 9.0).abs() < 1e-12, "what was before the break is forgotten");
+        assert_eq!(o.push(&odom(5_000_000_000, 5.0, 1)), Step::Continued);
+        assert!(matches!(o.push(&odom(9_000_000_000, 0.1, 1)), Step::Broken(_)), "from 0 after a silence");
+        assert!((o.at(0).unwrap().x_m - 0.1).abs() < 1e-12, "what was before the break is forgotten");
     }
 }

@@ -33,6 +33,15 @@ const LOOK_PATH_M: f64 = 2.0;
 /// … and a turn of a radian as much as so much path.
 const LOOK_PATH_PER_RAD_M: f64 = 2.0;
 
+/// φ of a stretch over which scans alone say where the robot is after its odometry broke: what was next to it
+/// may look like what it was carried to.
+const RESUMED: f64 = 0.2;
+/// φ where a scan that shows something is laid on nothing, or hardly.
+const UNREGISTERED: f64 = 0.1;
+const HARDLY_REGISTERED: f64 = 0.01;
+/// φ where scans and wheels part by so much, distance².
+const PARTED: [(f64, f64); 3] = [(16.0, 0.003), (36.0, 0.03), (100.0, 0.2)];
+
 impl FrontEnd {
     /// Registers the scan to the local map around the prediction; what it says is fused.
     pub(crate) fn correct(&mut self, sweep: &Sweep) {
@@ -45,7 +54,15 @@ impl FrontEnd {
         };
         let points = thin(&sweep.points, VOXEL_M);
         let moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
-        let Some(found) = self.register(&points, &prior) else { return };
+        let Some(found) = self.register(&points, &prior) else {
+            self.doubt(UNREGISTERED);
+            return;
+        };
+        if found.inlier_share < SHARE_SURE {
+            self.doubt(HARDLY_REGISTERED);
+        }
+        let parted = self.front_from_body.between(&found.target_from_source).log();
+        self.doubt(failed_by(parted.dot(&(information * parted))));
         self.front_from_body = found.target_from_source;
         self.rough_m += ROUGH_GAIN * (found.residual_m - self.rough_m);
         let rough = (self.rough_m / SIGMA_M).powi(2);
@@ -100,8 +117,14 @@ impl FrontEnd {
         let Some(found) = found.filter(|f| f.inlier_share >= SHARE_SURE) else { return false };
         self.front_from_body = found.target_from_source;
         self.wheels.lift();
+        self.doubt(RESUMED);
         true
     }
+}
+
+/// φ by how far scans and wheels part, distance²: of what a few standard deviations explain, nothing.
+fn failed_by(distance2: f64) -> f64 {
+    PARTED.iter().rev().find(|(least, _)| distance2 >= *least).map_or(0.0, |(_, failed)| *failed)
 }
 
 /// Length of the surfaces that a sweep shows, metres: a point stands for no more than [`LOOK_M`].
