@@ -17,7 +17,8 @@ use toponym_sim::{Draw, WheelsPrior};
 
 /// Tours with dark floor, and offices in which the laser goes blind, on wheels from smooth (0) to rough (1).
 const TOURS: [&str; 6] = ["small", "large", "autonomous", "twins", "ring", "rows"];
-const OFFICES: [(&str, f64); 3] = [("office, smooth wheels", 0.0), ("office, fair", 0.4), ("office, rough", 1.0)];
+const OFFICES: [(&str, f64); 3] =
+    [("office, smooth wheels", 0.0), ("office, fair", 0.4), ("office, rough", 1.0)];
 /// There it goes blind between these, metres of path.
 const BLINDED_M: [(f64, f64); 3] = [(40.0, 55.0), (85.0, 125.0), (150.0, 158.0)];
 /// Shorter stretches are doorways.
@@ -38,7 +39,9 @@ struct Crossing {
 pub fn report(kinds: &[String], seeds: Range<u64>, each: bool) {
     let offices = OFFICES.map(|(name, roughness)| (name, Some(roughness)));
     let all = TOURS.map(|name| (name, None)).into_iter().chain(offices);
-    for (name, roughness) in all.filter(|a| kinds.is_empty() || kinds.iter().any(|k| a.0.starts_with(k.as_str()))) {
+    for (name, roughness) in
+        all.filter(|a| kinds.is_empty() || kinds.iter().any(|k| a.0.starts_with(k.as_str())))
+    {
         let crossings: Vec<(u64, Crossing)> = seeds
             .clone()
             .into_par_iter()
@@ -133,7 +136,9 @@ fn blinded(message: &Message, dark_s: &[(f64, f64)]) -> Message {
 
 fn path_m(played: &Played, from_s: f64, to_s: f64) -> f64 {
     let times = (0..).map(|k| from_s + 0.1 * f64::from(k)).take_while(|t_s| *t_s < to_s);
-    times.map(|t_s| pose(&played.drive.at(t_s)).distance_m(&pose(&played.drive.at((t_s + 0.1).min(to_s))))).sum()
+    times
+        .map(|t_s| pose(&played.drive.at(t_s)).distance_m(&pose(&played.drive.at((t_s + 0.1).min(to_s)))))
+        .sum()
 }
 
 /// When [`BLINDED_M`] were driven.
@@ -189,7 +194,11 @@ fn summed(crossings: &[Crossing]) -> String {
         all.sort_by(f64::total_cmp);
         let covered = all.iter().filter(|d| **d < CHI2_95).count() as f64 / n;
         let median = all.get(all.len() / 2).copied().unwrap_or_default();
-        format!("{covered:.2} covered, NEES/3 {:.2} (median {:.2})", all.iter().sum::<f64>() / n / 3.0, median / 2.366)
+        format!(
+            "{covered:.2} covered, NEES/3 {:.2} (median {:.2})",
+            all.iter().sum::<f64>() / n / 3.0,
+            median / 2.366
+        )
     };
     format!(
         "{} stretches; off {}; claimed {}; of ideal {:.2} {:.2} {:.2}, volume^(1/3) {:.2}; {}; ideal: {}",

@@ -58,10 +58,10 @@ const HELD_BACK_MAX: usize = 1000;
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub(crate) struct Dark {
     /// The last place before it.
-    last: PlaceId,
+    pub(super) last: PlaceId,
     front_from_last: Pose2,
     /// What the pose relative to it is off by.
-    drift: Drift,
+    pub(super) drift: Drift,
     /// Covariance by noise of each edge from there on, up to the first place in the light.
     edges: Vec<Matrix3<f64>>,
     /// Once the laser sees again.

@@ -116,13 +116,13 @@ fn at_rest_and_turning_on_the_spot_it_stays_where_it_is() {
     }
 }
 
-/// Four metres in the dark with wheels that suddenly turn the robot by 3° a metre.
+/// Four metres in the dark with wheels that suddenly turn the robot by 1.5° a metre.
 fn over_the_dark(check: impl Fn(usize, &mut FrontEnd)) -> (Vec<Pose2>, Vec<FrozenPlace>) {
     let there = (0..60).map(|k| -3.0 + 0.1 * f64::from(k));
     let back = (0..40).map(|k| 3.0 - 0.1 * f64::from(k));
     let path: Vec<Pose2> = there.chain(back).map(|x| Pose2::new(x, -1.0, 0.0)).collect();
     let dark = |k: usize| (20..60).contains(&k);
-    let bend = |k: usize| if dark(k) { 0.05 } else { 0.0 };
+    let bend = |k: usize| if dark(k) { 0.026 } else { 0.0 };
     let odom = spoilt(&path, |k, d| Pose2::new(d.x_m, 0.0, bend(k) * d.x_m));
     let mut front = FrontEnd::new(1.0);
     let mut frozen = Vec::new();
@@ -247,4 +247,72 @@ fn a_guide_ahead_in_a_bare_corridor_does_not_hold_the_robot_back() {
     }
     let (here, path_m) = (front.front_from_body(), (n - 1) as f64 * step_m);
     assert!((here.x_m - path_m).abs() < 0.01 * path_m, "{path_m}, made {here:?}");
+}
+
+/// In the room for 12 m, then in the dark round a square and back to where it began; the path.
+fn round_a_square(front: &mut FrontEnd, side_m: f64, check: impl Fn(&FrontEnd)) -> Vec<Pose2> {
+    let there = (0..60).map(|k| Pose2::new(-3.0 + 0.1 * f64::from(k), -1.0, 0.0));
+    let mut path: Vec<Pose2> = there.clone().chain(there.rev()).collect();
+    let lit = path.len();
+    let side = (side_m / 0.1) as usize;
+    for k in 1..=4 * side {
+        let yaw_rad = if k % side == 0 { std::f64::consts::FRAC_PI_2 } else { 0.0 };
+        path.push(path[path.len() - 1].compose(&Pose2::new(0.1, 0.0, yaw_rad)));
+    }
+    for (k, pose) in path.iter().enumerate() {
+        front.scan(k as i64 * 100_000_000, *pose, seen(pose, k >= lit));
+        check(front);
+    }
+    path
+}
+
+/// The end of some edges of the chain, and its covariance.
+fn chained<'a>(chain: impl Iterator<Item = &'a Chain>) -> (Pose2, Matrix3<f64>) {
+    let (mut made, mut covariance) = (Pose2::default(), Matrix3::zeros());
+    for edge in chain {
+        let over = edge.previous_from_this.inverse().adjoint();
+        covariance = over * covariance * over.transpose() + edge.information.try_inverse().unwrap();
+        made = made.compose(&edge.previous_from_this);
+    }
+    (made, covariance)
+}
+
+#[test]
+fn edges_in_the_dark_add_up_to_what_wheels_are_worth_over_all_of_it() {
+    let mut front = FrontEnd::new(1.0);
+    round_a_square(&mut front, 20.0, |front| {
+        let Some(dark) = &front.dark else { return };
+        if front.open_places().last().is_none_or(|p| p.front_from_place != front.front_from_body()) {
+            return;
+        }
+        let held = front.open_places().filter(|p| p.id > dark.last).map(|p| &p.chain);
+        let (claimed, worth) = (chained(held).1, dark.drift.covariance(&front.wheels));
+        let root = worth.cholesky().unwrap().l().try_inverse().unwrap();
+        let ratio = (root * claimed * root.transpose()).symmetric_eigenvalues();
+        assert!(ratio.min() > 0.99 && ratio.max() < 1.3, "{ratio}, {claimed} {worth}");
+    });
+    let drift = front.dark.as_ref().unwrap().drift;
+    let all = drift.covariance(&front.wheels);
+    assert!(all[(2, 2)] > 1.3 * drift.noise[(2, 2)], "there is much to add up: {all} {}", drift.noise);
+}
+
+#[test]
+fn after_long_in_the_dark_a_look_alike_is_not_taken_for_what_was_left() {
+    let mut front = FrontEnd::new(1.0);
+    let path = round_a_square(&mut front, 20.0, |_| {});
+    let last = front.dark.as_ref().unwrap().last;
+    let mut frozen = Vec::new();
+    // Beyond the dark there is the room once more, a metre aside of it.
+    for k in path.len()..path.len() + 40 {
+        let odom = path[path.len() - 1].compose(&Pose2::new(0.1 * (k + 1 - path.len()) as f64, 0.0, 0.0));
+        let aside = Pose2::new(odom.x_m + 0.6, odom.y_m + 0.8, odom.yaw_rad);
+        frozen.extend(front.scan(k as i64 * 100_000_000, odom, seen(&aside, false)).frozen);
+    }
+    frozen.extend(front.freeze(f64::INFINITY));
+    frozen.retain(|f| f.open.id > last);
+    let first = frozen.iter().position(|f| !f.content.cloud.is_empty()).unwrap();
+    let (made, covariance) = chained(frozen[..=first].iter().map(|f| &f.open.chain));
+    let told = Pose2::new(-3.0, -1.0, 0.0).between(&path[path.len() - 1]);
+    assert!(made.distance_m(&told) < 0.5, "{made:?} {told:?}");
+    assert!(covariance.fixed_view::<2, 2>(0, 0).trace().sqrt() > 0.7, "{covariance}");
 }
