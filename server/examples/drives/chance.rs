@@ -52,10 +52,14 @@ pub fn report(drives: &[Drive]) {
     let trues = weighed.iter().filter(|w| w.is_true).count();
     println!("{trues} true fits, {} by chance, {} buildings", weighed.len() - trues, names.len());
 
-    let free: Vec<Example<5>> = examples(&weighed, |_| 0.0, |w| {
-        let [a, b, c, d] = w.looks;
-        [a, b, c, d, w.log_density_ratio]
-    });
+    let free: Vec<Example<5>> = examples(
+        &weighed,
+        |_| 0.0,
+        |w| {
+            let [a, b, c, d] = w.looks;
+            [a, b, c, d, w.log_density_ratio]
+        },
+    );
     println!("LOOKS and a power of the density, learned together: {:.2?}", fit(&free, |_| true));
     let bound: Vec<Example<4>> = examples(&weighed, |w| w.log_density_ratio, |w| w.looks);
     println!("LOOKS: {:.2?}", fit(&bound, |_| true));

@@ -36,6 +36,8 @@ pub struct Snapshot {
     particles: Vec<Particle>,
     /// Poses of all places, open ones too, in the best particle's map.
     poses: Vec<Pose2>,
+    /// Posterior mass of graphs that were dropped.
+    unresolved: f64,
     ledger: Arc<Ledger>,
     robot: Option<Pose2>,
     epoch: u64,
@@ -53,7 +55,18 @@ impl Snapshot {
         let places = filter.graph.places().to_vec();
         let poses = poses(filter.best(), &places, &open);
         let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
-        Self { places, open, structure, particles, poses, ledger, robot, epoch, rev }
+        Self {
+            places,
+            open,
+            structure,
+            particles,
+            poses,
+            unresolved: filter.unresolved(),
+            ledger,
+            robot,
+            epoch,
+            rev,
+        }
     }
 
     /// +1 when the map's coordinates jump.
@@ -213,7 +226,7 @@ impl Snapshot {
     /// Share of the posterior that the particles stand for; what was pruned and may yet be true is none of
     /// them, and no question is answered from it.
     fn resolved(&self) -> f64 {
-        1.0
+        1.0 - self.unresolved
     }
 
     fn candidate(&self, label: LabelId, Region { place, p_is, probability }: Region) -> Candidate {

@@ -179,8 +179,10 @@ mod tests {
         let particles: Vec<Particle> = maps
             .iter()
             .map(|&(weight, _)| {
-                let mut p = Particle { log_weight: weight.ln(), ..Particle::empty(1) };
-                heard.iter().for_each(|e| p.labels.add(*e));
+                let mut p = Particle { log_weight: weight.ln(), ..Particle::empty() };
+                for e in heard {
+                    p.labels.add(*e);
+                }
                 p
             })
             .collect();

@@ -53,7 +53,9 @@ pub fn stance<'a>(
     judgement: Option<Judgement>,
     others: impl Iterator<Item = &'a Question>,
 ) -> Stance {
-    let Some(Judgement { log_there, distance2, known, lets_go }) = judgement else { return Stance::Elsewhere };
+    let Some(Judgement { log_there, distance2, known, lets_go }) = judgement else {
+        return Stance::Elsewhere;
+    };
     if particle.refused.contains(&testimony.question) {
         return Stance::Elsewhere;
     }
@@ -87,6 +89,8 @@ pub struct Child {
     pub there: bool,
     /// Whether it adds the fit's edge.
     pub adds: bool,
+    /// Whether it is one of both answers, and nothing that the particle had said before.
+    pub is_new: bool,
     /// What it lets go of the chain.
     pub lets_go: Option<LetGo>,
     /// log w.
@@ -100,7 +104,8 @@ pub fn children(particles: &[Particle], stances: &[Stance]) -> Vec<Child> {
     let again = stances.iter().filter_map(expected).fold(0.0, f64::max);
     let of = |(parent, (p, stance)): (usize, (&Particle, &Stance))| {
         let child = |there, adds, log: f64| {
-            Child { parent, there, adds, lets_go: None, log_weight: p.log_weight + log }
+            let is_new = matches!(stance, Stance::Open { .. });
+            Child { parent, there, adds, is_new, lets_go: None, log_weight: p.log_weight + log }
         };
         match *stance {
             Stance::There { log_gain, fits } => vec![child(true, fits, log_gain)],
@@ -116,7 +121,8 @@ pub fn children(particles: &[Particle], stances: &[Stance]) -> Vec<Child> {
     all
 }
 
-/// A child as a particle of its own: G, X and w. None where the edge does not go with the poses.
+/// A child as a particle of its own: G, X and w. Where the edge does not go with the poses, an answer that the
+/// map gave by itself stands without it, and another has no graph: None.
 pub fn born(
     parent: &Particle,
     child: &Child,
@@ -133,16 +139,22 @@ pub fn born(
     }
     p.take(question);
     let Some(edge) = edge.filter(|_| child.adds) else { return Some(p) };
+    match with_edge(p.clone(), child, edge, structure) {
+        Some(tied) => p = tied,
+        None if child.is_new => return None,
+        None => return Some(p),
+    }
+    // What was said before counts for the floors that are one by now.
+    p.weigh_words(words);
+    Some(p)
+}
+
+fn with_edge(mut p: Particle, child: &Child, edge: &Edge, structure: &Structure) -> Option<Particle> {
     let before = p.belief.chi2(structure);
     p.add(edge.clone());
     if let Some(let_go) = child.lets_go {
         p.let_go(structure, &let_go).ok()?;
     }
     p.update(structure).ok()?;
-    if p.belief.chi2(structure) >= before + CHI2_RISE_MAX {
-        return None;
-    }
-    // What was said before counts for the floors that are one by now.
-    p.weigh_words(words);
-    Some(p)
+    (p.belief.chi2(structure) < before + CHI2_RISE_MAX).then_some(p)
 }

@@ -92,7 +92,9 @@ mod tests {
 
     #[test]
     fn a_heading_that_was_predicted_is_no_evidence_and_one_askew_is() {
-        let ratio = |off: f64, sigma: f64| -0.5 * ((off / sigma).powi(2) + TAU.ln()) - sigma.ln() - log_chance(off, sigma);
+        let ratio = |off: f64, sigma: f64| {
+            -0.5 * ((off / sigma).powi(2) + TAU.ln()) - sigma.ln() - log_chance(off, sigma)
+        };
         assert!((ratio(0.0, 0.01) - ratio(0.0, 0.2)).abs() < 1e-6);
         assert!(ratio(FRAC_PI_2, 0.1) < -50.0, "a quarter turn is a copy's");
         let askew = log_chance(0.8, 3.0);

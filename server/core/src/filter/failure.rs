@@ -49,8 +49,8 @@ pub fn log_failed(graph: &Graph, particle: &Particle, edge: &Edge) -> Option<(f6
     for s in first..=edge.j {
         let chain = &graph.place(s).chain;
         let needed = pose(s - 1).between(&there.compose(&pose(s)));
-        let log = chain.failed.max(f64::MIN_POSITIVE).ln()
-            + log_f(&chain.previous_from_this.between(&needed));
+        let log =
+            chain.failed.max(f64::MIN_POSITIVE).ln() + log_f(&chain.previous_from_this.between(&needed));
         sum = log_add(sum, log);
         if best.is_none_or(|(most, _)| log > most) {
             best = Some((log, s));
@@ -63,8 +63,7 @@ pub fn log_failed(graph: &Graph, particle: &Particle, edge: &Edge) -> Option<(f6
 fn log_f(off: &Pose2) -> f64 {
     let normal = |x: f64, sigma: f64| -0.5 * (x / sigma).powi(2) - (sigma * TAU.sqrt()).ln();
     let (share, [along, across, turn]) = SLIPPED;
-    let slipped =
-        share.ln() + normal(off.x_m, along) + normal(off.y_m, across) + normal(off.yaw_rad, turn);
+    let slipped = share.ln() + normal(off.x_m, along) + normal(off.y_m, across) + normal(off.yaw_rad, turn);
     let (share, [x, y]) = TURNED;
     let turned = share.ln() + normal(off.x_m, x) + normal(off.y_m, y) - TAU.ln();
     let near = off.x_m.abs().max(off.y_m.abs()) < 0.5 * ANYWHERE_M2.sqrt();

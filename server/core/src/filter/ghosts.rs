@@ -11,8 +11,8 @@
 //! An answer of u_q > [`REOPENED`] comes back as a graph; one of less than [`FORGOTTEN`] is forgotten.
 
 use crate::edge::QuestionId;
-use crate::filter::particle::Edge;
 use crate::filter::chance::log_add;
+use crate::filter::particle::Edge;
 use serde::{Deserialize, Serialize};
 
 /// Odds from which a dropped answer comes back.
@@ -56,7 +56,8 @@ impl Ghosts {
             Some(g) => g.log_odds = log_add(g.log_odds, ghost.log_odds),
             None => self.ghosts.push(ghost),
         }
-        self.ghosts.sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.edge.question.cmp(&b.edge.question)));
+        self.ghosts
+            .sort_by(|a, b| b.log_odds.total_cmp(&a.log_odds).then(a.edge.question.cmp(&b.edge.question)));
         self.ghosts.truncate(REMEMBERED_MAX);
     }
 

@@ -246,7 +246,7 @@ impl Filter {
             let news = fit.kind == EdgeKind::Semantic || !judged.iter().all(|j| j.is_some_and(|j| j.known));
             known += usize::from(!news);
             let wanted = news || known <= KNOWN_MAX;
-            let share = self.answer(edge, &stances, wanted, words);
+            let share = self.answer(&edge, &stances, wanted, words);
             effects.push(report(t, fit, share, judged.first().and_then(Option::as_ref)));
         }
         for p in &mut self.particles {
@@ -268,7 +268,7 @@ impl Filter {
 
     /// The best of all answers become the particles; the others are dropped. Returns the posterior share of
     /// those that hold the edge.
-    fn answer(&mut self, edge: Edge, stances: &[Stance], wanted: bool, words: &dyn Words) -> f64 {
+    fn answer(&mut self, edge: &Edge, stances: &[Stance], wanted: bool, words: &dyn Words) -> f64 {
         let mut all = children(&self.particles, stances);
         if let Some(Stance::There { log_gain, .. }) = stances.first() {
             self.ghosts.kept_gained(*log_gain);
@@ -276,16 +276,12 @@ impl Filter {
         let log_sum = all.iter().map(|c| c.log_weight).fold(f64::NEG_INFINITY, log_add);
         let worth = all.partition_point(|c| c.log_weight >= log_sum + KEPT_MIN.ln());
         let dropped = all.split_off(worth.min(self.config.particles.max(1) as usize).max(1));
-        for child in dropped.iter().filter(|c| matches!(stances[c.parent], Stance::Open { .. })) {
-            let log_odds = child.log_weight - log_sum;
-            self.ghosts.drop_answer(Ghost { edge: edge.clone(), there: child.there, log_odds, since: 0.0 });
+        for child in &dropped {
+            self.drop_child(edge, child, log_sum);
         }
-        let adds = |c: &Child| c.there && c.adds && (wanted || matches!(stances[c.parent], Stance::Open { .. }));
-        let entered = if all.iter().any(adds) {
-            edge.clone().enter(Arc::make_mut(&mut self.structure))
-        } else {
-            None
-        };
+        let adds = |c: &Child| c.there && c.adds && (wanted || c.is_new);
+        let entered =
+            if all.iter().any(adds) { edge.clone().enter(Arc::make_mut(&mut self.structure)) } else { None };
         self.disputed.extend(entered.iter().map(|e| e.factor));
         all.iter().filter_map(|c| c.lets_go).for_each(|l| self.loosen(l.from));
         let (structure, parents, question) = (&self.structure, &self.particles, edge.question);
@@ -293,12 +289,28 @@ impl Filter {
             let edge = entered.as_ref().filter(|_| adds(c));
             born(&parents[c.parent], c, question, edge, structure, words)
         };
-        let particles: Vec<Particle> = all.par_iter().filter_map(birth).collect();
+        let born: Vec<Option<Particle>> = all.par_iter().map(birth).collect();
+        for child in all.iter().zip(&born).filter_map(|(c, born)| born.is_none().then_some(c)) {
+            self.drop_child(edge, child, log_sum);
+        }
+        let particles: Vec<Particle> = born.into_iter().flatten().collect();
+        if !particles.is_empty() {
+            self.particles = particles;
+        }
         let there = |p: &&Particle| p.holds(edge.question);
-        self.particles = particles;
         self.rank();
         self.update(); // X of those who answer "elsewhere"
         self.particles.iter().filter(there).map(Particle::weight).sum()
+    }
+
+    fn drop_child(&mut self, edge: &Edge, child: &Child, log_sum: f64) {
+        let log_odds = child.log_weight - log_sum;
+        let ghost = if child.is_new {
+            Some(Ghost { edge: edge.clone(), there: child.there, log_odds, since: 0.0 })
+        } else {
+            difference(&self.particles[child.parent], self.best()).map(|g| Ghost { log_odds, ..g })
+        };
+        ghost.into_iter().for_each(|g| self.ghosts.drop_answer(g));
     }
 
     /// Makes a stretch of the chain one that particles may let go.
@@ -308,7 +320,9 @@ impl Filter {
         if self.graph.place(from).chain.broken || structure.loosened(from).is_some() {
             return;
         }
-        if let Ok(tight) = structure.loosen(from, &Matrix3::from_diagonal(&LOOSE.map(|sigma| sigma.powi(-2)).into())) {
+        if let Ok(tight) =
+            structure.loosen(from, &Matrix3::from_diagonal(&LOOSE.map(|sigma| sigma.powi(-2)).into()))
+        {
             structure.arrange();
             self.particles.iter_mut().for_each(|p| p.belief.hold_as_before(tight));
             self.disputed.push(tight);

@@ -5,8 +5,8 @@
 
 use crate::edge::QuestionId;
 use crate::filter::answer::same;
-use crate::filter::particle::Particle;
 use crate::filter::chance::log_add;
+use crate::filter::particle::Particle;
 use crate::smoothing::Structure;
 
 /// Graphs that weigh less are dropped: a question closes when the rest does.

@@ -60,10 +60,7 @@ impl Questions {
     pub fn see(&mut self, graph: &Graph, fit: &Fit, t: Vertex, log_looks: f64) -> Testimony {
         let before = self.remembered.iter().position(|q| q.is_seen_again(graph, fit, t));
         let before = before.and_then(|at| self.remembered.remove(at));
-        let id = before.as_ref().map_or(
-            QuestionId { boot: graph.place(t).segment, n: self.next },
-            |q| q.id,
-        );
+        let id = before.as_ref().map_or(QuestionId { boot: graph.place(t).segment, n: self.next }, |q| q.id);
         self.next += u32::from(before.is_none());
         // A stretch that was seen to agree stays seen, even where the next fit has fewer behind it.
         let (known, log_looks) =

@@ -22,7 +22,8 @@ impl Filter {
             let (i, j, kind) = (ghost.edge.i, ghost.edge.j, ghost.edge.kind);
             let Some(child) = self.come_back(&ghost, words) else { continue };
             let what = if ghost.there { "may be there after all" } else { "may not be there after all" };
-            let reason = format!("edge {j}–{i}: {what}, log odds {:.1}", child.log_weight - self.best().log_weight);
+            let reason =
+                format!("edge {j}–{i}: {what}, log odds {:.1}", child.log_weight - self.best().log_weight);
             self.particles.push(child);
             self.rank();
             effects.push(Effect::EdgeRefused { i: i.into(), j: j.into(), kind, reason });

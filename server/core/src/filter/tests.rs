@@ -1,18 +1,25 @@
 use super::*;
+use crate::filter::words::Silence;
 use crate::scan::matching::Mode;
 use crate::scan::place::Content;
 use crate::track::front::OpenPlace;
 use nalgebra::Vector3;
 
-/// A straight chain of places 1 m apart whose ends fit so that half of the posterior believes it.
+/// Where the chain's ends fit so that both answers are likely.
+const UNSURE_M: f64 = 18.6;
+
+/// A straight chain of places 1 m apart whose ends fit so that a good part of the posterior believes it.
 fn split() -> Filter {
-    let mut filter = Filter::new(Config::default());
-    for _ in 0..21 {
-        filter.extend(&chain());
-    }
-    let fits = vec![fit(0, 17.7, EdgeKind::Distance)];
-    filter.weigh_measured(20, &Measured { fits, refused: vec![] });
+    let mut filter = straight();
+    see(&mut filter, vec![fit(0, UNSURE_M, EdgeKind::Distance)]);
     filter
+}
+
+/// Fits of the last place.
+fn see(filter: &mut Filter, fits: Vec<Fit>) -> Effects {
+    let effects = filter.answer_all(20, &Measured { fits, ..Measured::default() }, &Silence);
+    filter.rank();
+    effects
 }
 
 /// Places 1 m apart on a straight line.
@@ -22,7 +29,7 @@ fn straight() -> Filter {
         let front_from_place = Pose2::new(f64::from(v), 0.0, 0.0);
         let (id, path_m, chain) = (v.into(), f64::from(v), chain());
         let open = OpenPlace { id, stamp_ns: 0, front_from_place, path_m, chain };
-        filter.step(FrozenPlace { open, content: Content::new(&[]) }, &|_, _| {});
+        filter.step(FrozenPlace { open, content: Content::new(&[]) }, &Silence, &|_, _| {});
     }
     filter
 }
@@ -33,12 +40,11 @@ fn of_what_all_know_two_edges_a_place_are_enough() {
     let mut fits: Vec<Fit> = (16..20).map(|i| fit(i, f64::from(20 - i), EdgeKind::Distance)).collect();
     fits.push(fit(15, 5.0, EdgeKind::Semantic));
     fits.push(fit(0, 20.0, EdgeKind::Distance));
-    let effects = filter.weigh_measured(20, &Measured { fits, refused: vec![] });
-    let taken = |e: &&Effect| matches!(e, Effect::EdgeAccepted { .. });
-    assert_eq!((effects.len(), effects.iter().filter(taken).count()), (6, 4));
+    let effects = see(&mut filter, fits);
+    assert_eq!(effects.len(), 6);
     let older = |p: &Particle| -> Vec<Vertex> { p.edges.iter().map(|e| e.i).collect() };
-    assert_eq!(older(filter.best()), [16, 17, 15], "words are said once");
-    assert!(filter.particles.iter().any(|p| older(p) == [16, 17, 15, 0]), "news is news");
+    assert!(filter.particles.iter().all(|p| older(p).starts_with(&[16, 17, 15])), "words are said once");
+    assert!(filter.particles.iter().any(|p| older(p).contains(&0)), "news is news");
 }
 
 fn fit(i: Vertex, x_m: f64, kind: EdgeKind) -> Fit {
@@ -49,7 +55,7 @@ fn fit(i: Vertex, x_m: f64, kind: EdgeKind) -> Fit {
 
 fn chain() -> Chain {
     let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
-    Chain { previous_from_this: Pose2::new(1.0, 0.0, 0.0), information, broken: false }
+    Chain { previous_from_this: Pose2::new(1.0, 0.0, 0.0), information, broken: false, failed: 1e-4 }
 }
 
 fn length_m(filter: &Filter) -> f64 {
@@ -61,8 +67,9 @@ fn a_fit_splits_a_particle_into_one_with_the_edge_and_one_without() {
     let filter = split();
     let [a, b] = &filter.particles[..] else { panic!("{}", filter.particles.len()) };
     let (with, without) = if a.edges.is_empty() { (b, a) } else { (a, b) };
-    assert_eq!((with.edges.len(), without.edges.len(), with.count + without.count), (1, 0, 30));
-    assert!((with.belief.pose(20).x_m - 17.7).abs() < 0.05);
+    assert_eq!((with.edges.len(), without.edges.len()), (1, 0));
+    assert!((with.weight() + without.weight() - 1.0).abs() < 1e-9 && with.weight() > 0.02);
+    assert!((with.belief.pose(20).x_m - UNSURE_M).abs() < 0.05);
     assert!((without.belief.pose(20).x_m - 20.0).abs() < 1e-9);
     assert_eq!(filter.disputed, [with.edges[0].factor]);
 }
@@ -88,7 +95,7 @@ fn a_factor_that_all_particles_hold_stays() {
     filter.forget();
     assert!(filter.structure.factor(factor).is_some() && filter.disputed.is_empty());
     filter.extend(&chain());
-    assert!((length_m(&filter) - 17.7).abs() < 0.05);
+    assert!((length_m(&filter) - UNSURE_M).abs() < 0.05);
 }
 
 /// Log-odds of the edge between those who hold it and those who refused.
@@ -103,13 +110,12 @@ fn log_odds(filter: &Filter) -> f64 {
 #[test]
 fn what_was_seen_once_persuades_once() {
     let mut filter = straight();
-    let see = |filter: &mut Filter| {
-        let fits = vec![fit(0, 17.7, EdgeKind::Distance)];
-        filter.weigh_measured(20, &Measured { fits, refused: vec![] });
-    };
+    let see = |filter: &mut Filter| see(filter, vec![fit(0, UNSURE_M, EdgeKind::Distance)]);
     see(&mut filter);
     let once = log_odds(&filter);
-    (0..3).for_each(|_| see(&mut filter));
+    for _ in 0..3 {
+        see(&mut filter);
+    }
     assert!(once.is_finite() && (log_odds(&filter) - once).abs() < 1e-9, "{once} {}", log_odds(&filter));
 }
 
@@ -121,4 +127,42 @@ fn an_imposed_edge_is_in_every_graph() {
         filter.particles.iter().all(|p| { p.edges.iter().any(|e| (e.i_from_j.x_m - 12.0).abs() < 1e-12) })
     );
     assert!(length_m(&filter) < 19.0);
+}
+
+#[test]
+fn a_false_loop_forced_on_all_is_undone() {
+    let mut filter = straight();
+    filter.impose(20, &fit(0, 12.0, EdgeKind::Relocalisation));
+    filter.reopen(&Silence);
+    filter.keep_best();
+    assert!((length_m(&filter) - 20.0).abs() < 1e-6 && filter.unresolved() < 0.02, "{}", filter.unresolved());
+}
+
+#[test]
+fn what_is_dropped_is_told() {
+    let mut filter = straight();
+    filter.config.particles = 1;
+    see(&mut filter, vec![fit(0, UNSURE_M, EdgeKind::Distance)]);
+    filter.keep_best();
+    let split = split();
+    let lighter = split.particles[1].weight();
+    assert_eq!(filter.particles.len(), 1);
+    assert!((filter.unresolved() - lighter).abs() < 0.2 * lighter, "{} {lighter}", filter.unresolved());
+}
+
+#[test]
+fn independent_revisits_weigh_the_same_in_whatever_order_they_are_seen() {
+    let weights = |order: [usize; 2]| {
+        let mut filter = straight();
+        let fits = [fit(0, 18.9, EdgeKind::Distance), fit(9, 9.6, EdgeKind::Distance)];
+        for k in order {
+            see(&mut filter, vec![fits[k].clone()]);
+        }
+        filter.keep_best();
+        filter.particles.iter().map(Particle::weight).collect::<Vec<_>>()
+    };
+    let (a, b) = (weights([0, 1]), weights([1, 0]));
+    assert_eq!(a.len(), b.len());
+    // The poses are no more linear than a chain of 20 m is.
+    assert!(a.iter().zip(&b).all(|(a, b)| (a - b).abs() < 0.02), "{a:?} {b:?}");
 }

@@ -58,9 +58,10 @@ pub struct Judgement {
 pub fn judge(graph: &Graph, structure: &Structure, particle: &Particle, edge: &Edge) -> Option<Judgement> {
     let predicted = particle.belief.relative(structure, edge.j, &[edge.i]).ok()?.into_iter().next()?;
     let (log_n, distance2) = log_density(&predicted, edge)?;
-    let held = DETECTED.ln() + edge.log_looks + log_n - log_chance(turned_rad(&predicted, edge), {
-        (predicted.covariance[(2, 2)] + edge.covariance[(2, 2)]).sqrt()
-    });
+    let held = DETECTED.ln() + edge.log_looks + log_n
+        - log_chance(turned_rad(&predicted, edge), {
+            (predicted.covariance[(2, 2)] + edge.covariance[(2, 2)]).sqrt()
+        });
     let judged = Judgement { log_there: held, distance2, known: is_known(&predicted, edge), lets_go: None };
     let otherwise = DETECTED.ln() + edge.log_looks - log_chance(0.0, PI);
     let broken =
@@ -108,10 +109,8 @@ pub fn log_density(predicted: &Relative, edge: &Edge) -> Option<(f64, f64)> {
 /// log density of a fit after a break of odometry, m⁻² rad⁻¹, in a map of so many places.
 fn started(predicted: &Relative, edge: &Edge, places: usize) -> Option<f64> {
     let sigma = Vector3::from(STAYED_SIGMA);
-    let stayed = Relative {
-        covariance: Matrix3::from_diagonal(&sigma.component_mul(&sigma)),
-        ..predicted.clone()
-    };
+    let stayed =
+        Relative { covariance: Matrix3::from_diagonal(&sigma.component_mul(&sigma)), ..predicted.clone() };
     let floor_m2 = PLACE_M2 * places.max(1) as f64;
     Some(log_add(STAYED.ln() + log_density(&stayed, edge)?.0, (SOMEWHERE / (floor_m2 * TAU)).ln()))
 }

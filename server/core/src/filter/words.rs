@@ -58,7 +58,8 @@ mod tests {
     #[test]
     fn words_count_once_however_often_they_weigh_and_leave_nothing_behind() {
         let mut filter = Filter::new(Config::default());
-        filter.particles = vec![Particle::empty(), Particle { failed: std::sync::Arc::new(vec![1]), ..Particle::empty() }];
+        filter.particles =
+            vec![Particle::empty(), Particle { failed: std::sync::Arc::new(vec![1]), ..Particle::empty() }];
         filter.rank();
         for _ in 0..3 {
             filter.weigh_words(&Saying(1.5));

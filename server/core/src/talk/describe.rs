@@ -352,8 +352,8 @@ mod tests {
         let tie =
             structure.add_factor(Factor { i: 0, j: 20, i_from_j, information: Matrix3::identity() * 1e6 });
         structure.arrange();
-        let mut apart = Particle::empty(1);
-        let mut near = Particle::empty(1);
+        let mut apart = Particle::empty();
+        let mut near = Particle::empty();
         near.belief.hold(tie.unwrap());
         for p in [&mut apart, &mut near] {
             p.update(structure).unwrap();

@@ -304,7 +304,12 @@ impl FrontEnd {
         // Systematic errors in the dark add up over all of it, and are dealt out once it is over.
         let driven = if in_the_dark { self.since_place.noise } else { self.since_place() };
         let information = (driven + bend).try_inverse().unwrap_or_else(Matrix3::identity);
-        let chain = Chain { previous_from_this, information, broken, failed: std::mem::replace(&mut self.failed, FAILED_MIN) };
+        let chain = Chain {
+            previous_from_this,
+            information,
+            broken,
+            failed: std::mem::replace(&mut self.failed, FAILED_MIN),
+        };
         self.open.push_back(OpenPlace {
             id: self.next_place,
             stamp_ns,

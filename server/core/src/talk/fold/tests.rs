@@ -18,7 +18,7 @@ fn map(x_m: &[f64]) -> Particle {
         before_m = x_m;
     }
     structure.arrange();
-    let mut particle = Particle::empty(1);
+    let mut particle = Particle::empty();
     particle.update(&structure).unwrap();
     particle
 }
@@ -146,7 +146,7 @@ fn a_place_spoken_of_ahead_of_the_graph_lies_where_it_will() {
     // The same before there is any graph.
     let mut talk = Talk::default();
     talk.name(0);
-    let none = Particle::empty(1);
+    let none = Particle::empty();
     let all = |_: &Particle| [0.0, 20.0, 1.0].map(|x_m| Pose2::new(x_m, 0.0, 0.0)).to_vec();
     for (utterance, place) in [(0, 0), (1, 2)] {
         talk.claim(&none, &[]);
@@ -256,7 +256,9 @@ proptest! {
         }
         let standing = talk.standing();
         let mut fold = Fold::new(&talk, &map, &standing);
-        standing.iter().for_each(|(_, units)| fold.hear(units));
+        for (_, units) in &standing {
+            fold.hear(units);
+        }
         let place = said[at % said.len()].0;
         let mut p = |said| {
             let ratio = fold.called(u32::MAX, (place, said), Sameness::Open, &[]);

@@ -137,7 +137,7 @@ mod tests {
     use crate::random::{Purpose, uniform};
 
     fn gauss(step: u64) -> f64 {
-        (0..12).map(|k| uniform(5, step, k, Purpose::Edge)).sum::<f64>() - 6.0
+        (0..12).map(|k| uniform(5, step, k, Purpose::Test)).sum::<f64>() - 6.0
     }
 
     /// Windows of .4, .8 and 1.6 m, every third of them in a bend, that registration sees with variance `fix` and

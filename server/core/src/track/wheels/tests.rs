@@ -10,7 +10,7 @@ struct Robot {
 }
 
 fn gauss(step: u64, draw: u64) -> f64 {
-    let u = |k| uniform(7, step, draw * 16 + k, Purpose::Edge);
+    let u = |k| uniform(7, step, draw * 16 + k, Purpose::Test);
     (0..12).map(u).sum::<f64>() - 6.0
 }
 
