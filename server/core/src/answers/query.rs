@@ -141,6 +141,15 @@ pub struct GraphAnswer {
     pub effective_sample_size: f64,
 }
 
+/// One way that the map can be, in what it differs from the others told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// Weight of the graph.
+    pub weight: f64,
+    /// "place 41 is place 7 again, place 60 is new ground".
+    pub words: String,
+}
+
 /// Occupancy grid. Row 0 has the lowest y.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Grid {
