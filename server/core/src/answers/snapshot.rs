@@ -1,17 +1,21 @@
 //! The posterior at one moment, immutable: what questions are answered from, over all particles.
 
+use crate::answers::differences::differences;
 use crate::answers::grid::grid;
 use crate::answers::query::{
-    Answer, Candidate, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query, WhereAnswer,
+    Answer, Candidate, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query,
+    WhereAnswer,
 };
 use crate::edge::{PlaceId, Vertex};
+use crate::effects::TrackState;
 use crate::filter::Filter;
 use crate::filter::labels::LabelId;
 use crate::filter::particle::Particle;
 use crate::filter::resample::effective_sample_size;
 use crate::geometry::Pose2;
 use crate::graph::Place;
-use crate::language::{self, Name};
+use crate::language::act::{About, Head, Question};
+use crate::language::{self, Content, Name};
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::front::OpenPlace;
@@ -28,6 +32,22 @@ const NAMES_MAX: usize = 5;
 /// Less probable names and candidates are noise.
 const PROBABILITY_MIN: f64 = 0.02;
 
+/// Places are called by a name in what graphs differ about, if it likely applies.
+const CALLED_MIN: f64 = 0.5;
+
+/// The robot at one moment, and the map's counters.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Now {
+    /// Its pose in the best particle's map.
+    pub robot: Option<Pose2>,
+    /// Whether to believe it.
+    pub state: TrackState,
+    /// +1 when the map's coordinates jump.
+    pub epoch: u64,
+    /// +1 per change.
+    pub rev: u64,
+}
+
 /// The posterior at one moment.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
@@ -37,39 +57,39 @@ pub struct Snapshot {
     particles: Vec<Particle>,
     /// Poses of all places, open ones too, in the best particle's map.
     poses: Vec<Pose2>,
+    /// Posterior mass of graphs that were dropped.
+    unresolved: f64,
     ledger: Arc<Ledger>,
-    robot: Option<Pose2>,
-    epoch: u64,
-    rev: u64,
+    now: Now,
 }
 
 impl Snapshot {
-    pub(crate) fn new(
-        filter: &Filter,
-        ledger: Arc<Ledger>,
-        open: Vec<OpenPlace>,
-        robot: Option<Pose2>,
-        (epoch, rev): (u64, u64),
-    ) -> Self {
+    pub(crate) fn new(filter: &Filter, ledger: Arc<Ledger>, open: Vec<OpenPlace>, now: Now) -> Self {
         let places = filter.graph.places().to_vec();
         let poses = poses(filter.best(), &places, &open);
         let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
-        Self { places, open, structure, particles, poses, ledger, robot, epoch, rev }
+        let unresolved = filter.unresolved();
+        Self { places, open, structure, particles, poses, unresolved, ledger, now }
     }
 
     /// +1 when the map's coordinates jump.
     pub fn epoch(&self) -> u64 {
-        self.epoch
+        self.now.epoch
     }
 
     /// +1 per change.
     pub fn rev(&self) -> u64 {
-        self.rev
+        self.now.rev
     }
 
     /// Newest pose of the robot in the map.
     pub fn robot(&self) -> Option<Pose2> {
-        self.robot
+        self.now.robot
+    }
+
+    /// Whether to believe that pose.
+    pub fn state(&self) -> TrackState {
+        self.now.state
     }
 
     /// Answers a question; never fails: not knowing is an answer.
@@ -107,12 +127,23 @@ impl Snapshot {
             })
             .collect();
         GraphAnswer {
-            epoch: self.epoch,
-            rev: self.rev,
+            epoch: self.now.epoch,
+            rev: self.now.rev,
             places,
             particles: self.particles.iter().map(|p| self.particle(p)).collect(),
+            unresolved: self.unresolved,
+            differences: self.differences(),
             effective_sample_size: effective_sample_size(&self.particles),
         }
+    }
+
+    /// What the best graphs disagree about.
+    pub fn differences(&self) -> Vec<Difference> {
+        let called = |id: PlaceId| {
+            let (name, p) = self.names_of(id as Vertex).into_iter().next()?;
+            (p >= CALLED_MIN).then_some(name)
+        };
+        differences(&self.particles, 1.0 - self.unresolved, called)
     }
 
     fn particle(&self, p: &Particle) -> ParticleView {
@@ -124,7 +155,7 @@ impl Snapshot {
         });
         ParticleView {
             count: p.count,
-            weight: p.weight(),
+            weight: (1.0 - self.unresolved) * p.weight(),
             edges: edges.collect(),
             poses: poses(p, &self.places, &self.open),
         }
@@ -196,21 +227,13 @@ impl Snapshot {
             label: name.map(|n: Name| n.as_str().to_owned()),
             via: if label.is_some() { "exact" } else { "unknown" }.to_owned(),
             p_none: 1.0,
+            unresolved: self.unresolved,
             candidates: Vec::new(),
-            robot: self.robot,
+            // Who is lost is nowhere to count distances from.
+            robot: self.now.robot.filter(|_| self.now.state != TrackState::Lost),
         };
         let Some(label) = label else { return answer };
-        let mut candidates = self.regions(label);
-        // The name applies nowhere only if it applies to none of them; else one of them is meant.
-        let p_none: f64 = candidates.iter().map(|c| 1.0 - c.p_is).product();
-        let sum: f64 = candidates.iter().map(|c| c.p_is).sum();
-        for c in &mut candidates {
-            c.probability = (1.0 - p_none) * c.p_is / sum.max(f64::MIN_POSITIVE);
-        }
-        candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
-        candidates.truncate(CANDIDATES_MAX);
-        answer.p_none = 1.0 - candidates.iter().map(|c| c.probability).sum::<f64>();
-        answer.candidates = candidates;
+        (answer.candidates, answer.p_none) = shared(self.regions(label), self.unresolved);
         answer
     }
 
@@ -277,6 +300,29 @@ impl Snapshot {
     }
 }
 
+/// Which of the candidates is meant, best first, and the probability that none is.
+fn shared(mut candidates: Vec<Candidate>, unresolved: f64) -> (Vec<Candidate>, f64) {
+    // The name applies nowhere only if it applies to none of them; else one of them is meant.
+    let nowhere: f64 = candidates.iter().map(|c| 1.0 - c.p_is).product();
+    let sum: f64 = candidates.iter().map(|c| c.p_is).sum();
+    for c in &mut candidates {
+        c.probability = (1.0 - unresolved) * (1.0 - nowhere) * c.p_is / sum.max(f64::MIN_POSITIVE);
+    }
+    candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
+    candidates.truncate(CANDIDATES_MAX);
+    let p_none = 1.0 - candidates.iter().map(|c| c.probability).sum::<f64>();
+    (candidates, p_none)
+}
+
+/// Whether a question is about the robot's own place: "where am I?" Who is lost can't be told.
+pub fn asks_of_robot(text: &str) -> bool {
+    let of_here = |content: &Content| match content {
+        Content::Ask { kind: Question::Where, about: About::Phrase(phrase) } => phrase.head == Head::Here,
+        _ => false,
+    };
+    language::parse(text).acts().iter().any(|act| of_here(&act.content))
+}
+
 /// Poses of all places, open ones too, in a particle's map.
 fn poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> {
     let mut poses = p.belief.poses();
@@ -301,3 +347,6 @@ pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Ve
     };
     open.iter().map(|o| map_from_front.compose(&o.front_from_place)).collect()
 }
+
+#[cfg(test)]
+mod tests;

@@ -106,7 +106,12 @@ impl Filter {
             place: t.into(),
             stamp_ns: self.graph.place(t).stamp_ns,
             proposed,
-            weights: self.particles.iter().map(|p| (p.count, p.weight())).collect(),
+            weights: self
+                .particles
+                .iter()
+                .map(|p| (p.count, (1.0 - self.unresolved()) * p.weight()))
+                .collect(),
+            unresolved: self.unresolved(),
             effective_sample_size,
         }
     }
@@ -114,6 +119,12 @@ impl Filter {
     /// The best particle.
     pub fn best(&self) -> &Particle {
         &self.particles[0]
+    }
+
+    /// Posterior mass of graphs that were dropped, in [0, 1]. Weights of those kept sum to one among
+    /// themselves.
+    pub fn unresolved(&self) -> f64 {
+        0.0
     }
 
     /// Makes anew what a saved filter leaves out. Before that, covariances are unknown.
