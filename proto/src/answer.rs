@@ -43,8 +43,12 @@ pub struct WhereReply {
     pub map: MapIdentity,
     /// Stamp of the newest message in the answer's map.
     pub stamp: Stamp,
-    /// Probability that it is nowhere in the map; sums to one with the candidates'.
+    /// Probability that it is nowhere in the map, or that the map is none of those kept; sums to one with
+    /// the candidates'.
     pub p_none: f64,
+    /// Posterior mass of graphs that were dropped; part of `p_none`.
+    #[serde(default)]
+    pub unresolved: f64,
     /// Best first.
     pub candidates: Vec<Candidate>,
 }
@@ -82,7 +86,7 @@ pub struct Candidate {
     pub polygon_m: Vec<[f64; 2]>,
     /// Where to send a robot.
     pub goal: Option<Goal>,
-    /// From the robot to it.
+    /// From the robot to it; none while the robot is lost.
     pub from_robot: Option<FromRobot>,
     /// Ids of the utterances behind it.
     pub because: Vec<String>,
@@ -159,10 +163,25 @@ pub struct GraphReply {
     pub map: MapIdentity,
     /// Places of the best graph, in order of their ids.
     pub places: Vec<Place>,
-    /// Distinct graphs, best first; weights sum to one.
+    /// Distinct graphs, best first; weights sum to one with `unresolved`.
     pub particles: Vec<Particle>,
-    /// 1 / Σ w².
+    /// Posterior mass of graphs that were dropped.
+    #[serde(default)]
+    pub unresolved: f64,
+    /// What the best graphs disagree about; empty where one is all there is.
+    #[serde(default)]
+    pub differences: Vec<Difference>,
+    /// 1 / Σ w² among those kept.
     pub effective_sample_size: f64,
+}
+
+/// One way that the map can be, in what it differs from the others told.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// Weight of the graph.
+    pub weight: f64,
+    /// For people: "place 41 is place 7 again".
+    pub words: String,
 }
 
 /// A vertex of the best graph.
@@ -297,7 +316,7 @@ pub enum ErrorCode {
     Busy,
     /// Longer or larger than the limits.
     TooLarge,
-    /// The robot doesn't know where it is.
+    /// The robot doesn't know where it is, and what was asked counts from there.
     NotLocalised,
     /// The map is another robot's.
     MapTaken,
@@ -326,6 +345,7 @@ mod tests {
             map: MapIdentity { id: "h1".into(), ..Default::default() },
             stamp: Stamp { ns: 1_000_000_005 },
             p_none: 0.25,
+            unresolved: 0.1,
             candidates: vec![Candidate {
                 region: 12,
                 label: "kitchen".into(),
@@ -353,5 +373,13 @@ mod tests {
             r#"{"error": {"code": "on_fire", "message": "m", "field": null, "hint": null, "more": 1}}"#;
         let reply: ErrorReply = serde_json::from_str(text).unwrap();
         assert_eq!(reply.error.code, ErrorCode::Unknown);
+        let states = ["mapping", "localised", "doubtful", "lost", "asleep"].map(serde_json::Value::from);
+        let states = states.map(|s| serde_json::from_value::<PoseState>(s).unwrap());
+        assert_eq!(states[2..], [PoseState::Doubtful, PoseState::Lost, PoseState::Unknown]);
+        // An earlier server tells neither what is unresolved nor what graphs differ in.
+        let old = r#"{"v": 1, "query": "graph", "map": {"id": "m", "uuid": "u", "epoch": 0, "rev": 0},
+                      "places": [], "particles": [], "effective_sample_size": 1.0}"#;
+        let old: GraphReply = serde_json::from_str(old).unwrap();
+        assert!(old.unresolved.abs() < f64::EPSILON && old.differences.is_empty());
     }
 }

@@ -74,8 +74,13 @@ pub enum PoseState {
     Mapping,
     /// The robot is found in a map that is kept.
     Localised,
-    /// It isn't known.
+    /// The pose may be wrong: less than 95 % of the posterior is within 1 m and 10° of it.
+    Doubtful,
+    /// It more likely is: less than half of the posterior is.
     Lost,
+    /// A state of a later server: not to be relied on.
+    #[serde(other)]
+    Unknown,
 }
 
 /// On `out/ack`: everything of this boot up to and with `seq` was handed to the map, or given up.
@@ -127,7 +132,7 @@ pub struct Counts {
     pub lost: u64,
 }
 
-/// On `map/{map}/out/jump`: coordinates of the map changed.
+/// On `map/{map}/out/jump`: coordinates of the map changed, by more than 5 cm or 1° at the robot.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Jump {
     /// [`crate::answer::ANSWER_VERSION`].

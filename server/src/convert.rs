@@ -9,8 +9,9 @@ use toponym_core::effects::{self, TrackState};
 use toponym_core::event::{self, Event};
 use toponym_core::{Pose2, geometry};
 use toponym_proto::answer::{
-    ANSWER_VERSION, Candidate, Edge, FromRobot, Goal, GraphReply, GridReply, Grounded, Heard, HeardStatus,
-    LabelEntry, LabelsReply, MapIdentity, Particle, Place, PoseState, Reachable, Resolved, WhereReply,
+    ANSWER_VERSION, Candidate, Difference, Edge, FromRobot, Goal, GraphReply, GridReply, Grounded, Heard,
+    HeardStatus, LabelEntry, LabelsReply, MapIdentity, Particle, Place, PoseState, Reachable, Resolved,
+    WhereReply,
 };
 use toponym_proto::{Mend, Message, Pose, Stamp};
 
@@ -88,6 +89,7 @@ pub fn pose_state(state: TrackState) -> PoseState {
     match state {
         TrackState::Mapping => PoseState::Mapping,
         TrackState::Localised => PoseState::Localised,
+        TrackState::Doubtful => PoseState::Doubtful,
         TrackState::Lost => PoseState::Lost,
     }
 }
@@ -120,6 +122,7 @@ pub fn where_reply(answer: WhereAnswer, map: MapIdentity, stamp: Stamp, robot: &
         map,
         stamp,
         p_none: answer.p_none,
+        unresolved: answer.unresolved,
         candidates: answer.candidates.into_iter().map(|c| candidate(c, from.as_ref(), robot)).collect(),
     }
 }
@@ -177,8 +180,15 @@ pub fn graph_reply(graph: GraphAnswer, map: MapIdentity) -> GraphReply {
         map,
         places: places.collect(),
         particles: particles.collect(),
+        unresolved: graph.unresolved,
+        differences: graph.differences.into_iter().map(difference).collect(),
         effective_sample_size: graph.effective_sample_size,
     }
+}
+
+/// What a graph differs in, as it goes out.
+pub fn difference(d: query::Difference) -> Difference {
+    Difference { weight: d.weight, words: d.words }
 }
 
 fn edge(e: &query::EdgeView) -> Edge {
@@ -271,9 +281,17 @@ mod tests {
             label: Some("gym".into()),
             via: "exact".into(),
             p_none: 0.0,
+            unresolved: 0.0,
             candidates: vec![candidate],
             robot: Some(Pose2::new(1.0, 2.0, FRAC_PI_2)),
         };
+        let lost = where_reply(
+            WhereAnswer { robot: None, ..answer.clone() },
+            MapIdentity::default(),
+            Stamp { ns: 1 },
+            "r07",
+        );
+        assert_eq!((lost.candidates[0].from_robot.as_ref(), lost.candidates[0].x_m), (None, 1.0));
         let reply = where_reply(answer, MapIdentity::default(), Stamp { ns: 1 }, "r07");
         let from = reply.candidates[0].from_robot.as_ref().unwrap();
         assert!((from.distance_m - 3.0).abs() < 1e-12 && from.bearing_rad.abs() < 1e-12);

@@ -14,7 +14,7 @@ use tokio::sync::broadcast::Receiver;
 use tokio::time::{Instant, sleep_until, timeout};
 use toponym::{Guide, Planner, Robot, RobotConfig};
 use toponym_core::Pose2;
-use toponym_core::answers::query::{EdgeView, GraphAnswer, Grid, ParticleView, PlaceView};
+use toponym_core::answers::query::{Difference, EdgeView, GraphAnswer, Grid, ParticleView, PlaceView};
 use toponym_core::edge::EdgeKind;
 use toponym_proto::answer::{Candidate, GraphReply, GridReply, Heard, WhereReply};
 use toponym_proto::keys::DEFAULT_SITE;
@@ -229,6 +229,12 @@ fn graph(reply: GraphReply) -> GraphAnswer {
         rev: reply.map.rev,
         places: places.collect(),
         particles: particles.collect(),
+        unresolved: reply.unresolved,
+        differences: reply
+            .differences
+            .into_iter()
+            .map(|d| Difference { weight: d.weight, words: d.words })
+            .collect(),
         effective_sample_size: reply.effective_sample_size,
     }
 }
@@ -273,6 +279,7 @@ mod tests {
             map: MapIdentity::default(),
             stamp: toponym_proto::Stamp::default(),
             p_none: 0.1,
+            unresolved: 0.0,
             candidates: vec![candidate],
         };
         assert_eq!(

@@ -158,7 +158,7 @@ fn score_seed(folder: &FilePath) -> Result<(Setting, Outcome)> {
         moments,
         trajectory: trajectory(&folder.join("trajectory.txt"))?,
         answers: report.answers(),
-        unresolved: None,
+        unresolved: report.unresolved(),
         cpu_ms_per_s: report.cpu_ms_per_s(),
     };
     let setting =

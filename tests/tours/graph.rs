@@ -26,7 +26,7 @@ pub struct Place {
 /// A distinct graph.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Particle {
-    /// All sum to one.
+    /// All sum to one with what the mapper calls unresolved.
     pub weight: f64,
     /// Loop edges.
     pub edges: Vec<Edge>,
@@ -99,6 +99,7 @@ impl Answer {
 pub struct Report {
     places: Vec<ReportPlace>,
     particles: Vec<ReportParticle>,
+    unresolved: Option<f64>,
     #[serde(default)]
     answers: Vec<ReportAnswer>,
     timing: Option<ReportTiming>,
@@ -175,6 +176,11 @@ impl Report {
         self.answers.iter().map(answer).collect()
     }
 
+    /// Posterior mass of graphs that were dropped, if the report tells it.
+    pub fn unresolved(&self) -> Option<f64> {
+        self.unresolved
+    }
+
     /// Processor time per second of log, if the report tells it.
     pub fn cpu_ms_per_s(&self) -> Option<f64> {
         let timing = self.timing.as_ref()?;
@@ -235,6 +241,10 @@ mod tests {
         assert_eq!(graphs.places[0].name.as_deref(), Some("gym"));
         assert_eq!(graphs.places[1].name, None);
         assert_eq!(read(report()).answers()[0].best_m, Some([2.0, 1.0]));
+        assert_eq!(read(report()).unresolved(), None, "not every mapper tells");
+        let mut told = report();
+        told["unresolved"] = json!(0.25);
+        assert_eq!(read(told).unresolved(), Some(0.25));
     }
 
     #[test]

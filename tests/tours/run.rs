@@ -111,6 +111,7 @@ impl Run {
         };
         let trajectory = self.scans.iter().filter_map(row).collect();
         let answers = truth.questions.iter().filter_map(|q| self.ask(&q.text)).collect();
+        let unresolved = Some(graph.unresolved);
         self.checkpoints.push(Some(Graphs::of(graph)));
         let (from_s, to_s) = truth.path.span_s();
         Mapped {
@@ -118,7 +119,7 @@ impl Run {
             moments: self.moments,
             trajectory,
             answers,
-            unresolved: None,
+            unresolved,
             cpu_ms_per_s: (to_s > from_s).then(|| self.spent.as_secs_f64() * 1e3 / (to_s - from_s)),
         }
     }

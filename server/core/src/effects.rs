@@ -17,7 +17,9 @@ pub enum TrackState {
     Mapping,
     /// The map is kept, the robot found in it.
     Localised,
-    /// The link to older places is broken.
+    /// The pose told may be wrong: less than 95 % of the posterior is within 1 m and 10° of it.
+    Doubtful,
+    /// It more likely is: less than half of the posterior is.
     Lost,
 }
 
@@ -132,9 +134,11 @@ pub enum Effect {
         /// The older places that were proposed, each with the largest probability that a particle gives
         /// it; of many the likeliest are matched, and the others wait.
         proposed: Vec<Proposal>,
-        /// Copies and weight of each distinct graph, best first; weights sum to one.
+        /// Copies and weight of each distinct graph, best first; with `unresolved` they sum to one.
         weights: Vec<(u32, f64)>,
-        /// Effective sample size, before any resampling.
+        /// Posterior mass of graphs that were dropped.
+        unresolved: f64,
+        /// Effective sample size among those kept, before any resampling.
         effective_sample_size: f64,
     },
     /// Particles were resampled.
@@ -142,7 +146,16 @@ pub enum Effect {
         /// Effective sample size before.
         effective_sample_size: f64,
     },
-    /// The map's coordinates jumped: another particle is best now.
+    /// How well the robot knows where it is has changed. Comes with the first scan, too.
+    StateChanged {
+        /// Stamp of the newest scan.
+        stamp_ns: StampNs,
+        /// From now on.
+        state: TrackState,
+        /// In words.
+        why: String,
+    },
+    /// The map's coordinates jumped: the robot's own pose in the map is another one without a motion.
     Jumped {
         /// `epoch` after the jump.
         epoch: u64,

@@ -1,15 +1,19 @@
 //! The core's public face: events in, effects out.
 
-use crate::answers::snapshot::{Snapshot, open_poses};
+mod spread;
+mod standing;
+mod unseen;
+
+use crate::answers::snapshot::{Now, Snapshot, open_poses};
 use crate::edge::Vertex;
-use crate::effects::{Effect, Effects, TrackState};
+use crate::effects::{Effect, Effects};
 use crate::event::{Odom, Scan, StampNs, Utterance};
 use crate::filter::Filter;
 use crate::filter::loops::Measured;
-use crate::filter::particle::{Edge, Particle};
-use crate::filter::propose::is_lost;
-use crate::geometry::Pose2;
+use crate::filter::particle::Particle;
+use crate::geometry::{Pose2, wrap};
 use crate::graph::Graph;
+use crate::mapper::standing::Standing;
 use crate::smoothing::SmoothError;
 use crate::talk::{Here, Talk};
 use crate::track::Track;
@@ -20,16 +24,24 @@ use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
+/// The robot's pose in the map has changed by this without a motion: that is told …
+const JUMP_M: f64 = 0.05;
+/// … or by this.
+const JUMP_RAD: f64 = 1.0_f64.to_radians();
+
 /// One map and the robot on it.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Mapper {
     track: Track,
     filter: Filter,
     talk: Talk,
+    standing: Standing,
     /// +1 when coordinates jump.
     epoch: u64,
     /// +1 per change.
     rev: u64,
+    /// Changes of coordinates since the last jump, too small to tell each: the map's frame now from that told.
+    untold: Pose2,
     /// What is spoilt on purpose; goes with a restart.
     #[serde(skip)]
     trial: Trial,
@@ -74,7 +86,16 @@ impl Mapper {
     /// An empty map for which some of what is measured will be spoilt.
     pub fn on_trial(config: Config, trial: Trial) -> Self {
         let track = Track::new(config.place_spacing_m);
-        Self { track, filter: Filter::new(config), talk: Talk::default(), epoch: 0, rev: 0, trial }
+        Self {
+            track,
+            filter: Filter::new(config),
+            talk: Talk::default(),
+            standing: Standing::default(),
+            epoch: 0,
+            rev: 0,
+            untold: Pose2::default(),
+            trial,
+        }
     }
 
     /// Takes one event.
@@ -87,6 +108,7 @@ impl Mapper {
             Event::Utterance(utterance) => self.hear(&utterance, &mut effects),
             Event::Command(command) => {
                 self.change(&mut effects, |filter, talk| vec![Effect::Mended(talk.mend(filter, &command))]);
+                self.stand(&mut effects);
             }
             Event::Flush => self.flush(&mut effects),
         }
@@ -104,8 +126,12 @@ impl Mapper {
             &self.filter,
             self.talk.ledger.clone(),
             self.track.front.open_places().cloned().collect(),
-            self.map_from_body(),
-            (self.epoch, self.rev),
+            Now {
+                robot: self.map_from_body(),
+                state: self.standing.state(),
+                epoch: self.epoch,
+                rev: self.rev,
+            },
         ))
     }
 
@@ -154,7 +180,9 @@ impl Mapper {
         while let Some(scan) = self.track.next_due(now_ns) {
             if let Some(placed) = self.track.place(&scan, effects) {
                 self.rev += u64::from(placed.began);
+                self.corrected(placed.new_from_old, effects);
                 self.grow(placed.frozen, effects);
+                self.stand(effects);
                 effects.push(self.tracked(scan.stamp_ns, placed.odom_from_body));
             }
         }
@@ -174,16 +202,46 @@ impl Mapper {
         }
     }
 
-    /// Changes the posterior. Where another particle is best then, the map's coordinates jump.
+    /// Changes the posterior. Where that moves the robot in the best particle's map, coordinates jump.
     fn change(&mut self, effects: &mut Effects, change: impl FnOnce(&mut Filter, &mut Talk) -> Effects) {
-        let (before, edges) = (self.map_from_body(), self.filter.best().edges.clone());
+        let before = self.map_from_body();
         effects.extend(change(&mut self.filter, &mut self.talk));
         self.rev += 1;
-        if !continues(&edges, &self.filter.best().edges)
-            && let (Some(old), Some(new)) = (before, self.map_from_body())
-        {
+        self.standing.renew();
+        if let (Some(old), Some(new)) = (before, self.map_from_body()) {
+            self.moved(&old, &new, effects);
+        }
+    }
+
+    /// The front end has corrected where the body is: places not left yet move along with it.
+    fn corrected(&mut self, new_from_old: Option<Pose2>, effects: &mut Effects) {
+        if let (Some(new_from_old), Some(new)) = (new_from_old, self.map_from_body()) {
+            let body = self.track.front.front_from_body();
+            let body_before = new_from_old.inverse().compose(&body);
+            self.moved(&new.compose(&body.between(&body_before)), &new, effects);
+        }
+    }
+
+    /// The robot's pose in the map is another one without a motion. Small changes are told together, once
+    /// they come to something.
+    fn moved(&mut self, old: &Pose2, new: &Pose2, effects: &mut Effects) {
+        self.untold = new.compose(&old.inverse()).compose(&self.untold);
+        let as_told = self.untold.inverse().compose(new);
+        let turned_rad = wrap(new.yaw_rad - as_told.yaw_rad).abs();
+        if as_told.distance_m(new) > JUMP_M || turned_rad > JUMP_RAD {
             self.epoch += 1;
-            effects.push(Effect::Jumped { epoch: self.epoch, new_from_old: new.compose(&old.inverse()) });
+            let new_from_old = std::mem::take(&mut self.untold);
+            effects.push(Effect::Jumped { epoch: self.epoch, new_from_old });
+        }
+    }
+
+    /// Looks how well the robot knows where it is, and tells if that has changed.
+    fn stand(&mut self, effects: &mut Effects) {
+        let front = &self.track.front;
+        let (Some(stamp_ns), Some(told)) = (front.newest_ns(), self.map_from_body()) else { return };
+        if let Some((state, doubt)) = self.standing.changed(&self.filter, front, &told) {
+            let why = doubt.why(&self.snapshot().differences());
+            effects.push(Effect::StateChanged { stamp_ns, state, why });
         }
     }
 
@@ -202,6 +260,7 @@ impl Mapper {
         };
         let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m };
         self.change(effects, |filter, talk| vec![Effect::Heard(talk.hear(filter, u, &here))]);
+        self.stand(effects);
     }
 
     fn flush(&mut self, effects: &mut Effects) {
@@ -212,6 +271,7 @@ impl Mapper {
             talk.reground_all(filter);
             filter.finish(talk)
         });
+        self.stand(effects);
     }
 
     /// The robot in the best particle's map.
@@ -222,7 +282,8 @@ impl Mapper {
             let place = self.filter.graph.place(v as Vertex);
             return Some(best.pose(v as Vertex).compose(&place.front_from_place.between(&body)));
         }
-        front.open_places().next().map(|first| first.front_from_place.between(&body))
+        // Until a place is left, both frames begin at the first scan.
+        front.newest_ns().map(|_| body)
     }
 
     fn tracked(&self, stamp_ns: StampNs, odom_from_body: Pose2) -> Effect {
@@ -232,16 +293,8 @@ impl Mapper {
             map_from_body,
             map_from_odom: map_from_body.compose(&odom_from_body.inverse()),
             covariance: self.covariance(),
-            state: if self.is_lost() { TrackState::Lost } else { TrackState::Mapping },
+            state: self.standing.state(),
         }
-    }
-
-    /// Whether the link to older places is broken and not mended yet.
-    fn is_lost(&self) -> bool {
-        let Filter { graph, structure, .. } = &self.filter;
-        let best = &self.filter.best().belief;
-        self.track.front.open_places().any(|p| p.chain.broken)
-            || best.len().checked_sub(1).is_some_and(|v| is_lost(graph, structure, best, v as Vertex))
     }
 
     /// Covariance of the robot's pose in the best particle's map: that of the newest vertex, carried
@@ -268,59 +321,5 @@ impl Mapper {
     }
 }
 
-/// Whether a graph is another one with edges added.
-fn continues(before: &[Edge], after: &[Edge]) -> bool {
-    after.len() >= before.len() && after.iter().zip(before).all(|(a, b)| a == b)
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::edge::EdgeKind;
-    use crate::event::{Laser, Setup};
-
-    #[test]
-    fn whatever_makes_another_particle_the_best_tells_that_coordinates_jump() {
-        let mut mapper = Mapper::new(Config::default());
-        let laser = Laser {
-            id: "l".into(),
-            body_from_laser: Pose2::default(),
-            upside_down: false,
-            range_min_m: 0.1,
-            range_max_m: 30.0,
-            ignored_rad: vec![],
-        };
-        mapper.step(Event::Setup(Setup { robot: "r".into(), lasers: vec![laser] }));
-        let still = Odom { robot: "r".into(), boot: 0, stamp_ns: 0, odom_from_body: Pose2::default() };
-        mapper.step(Event::Odom(still));
-        mapper.step(Event::Scan(Scan {
-            robot: "r".into(),
-            laser: "l".into(),
-            stamp_ns: 0,
-            angle_min_rad: -1.5,
-            angle_increment_rad: 0.1,
-            time_increment_s: 0.0,
-            ranges_m: vec![5.0; 31],
-        }));
-        let edge = Edge {
-            i: 0,
-            j: 1,
-            kind: EdgeKind::Distance,
-            i_from_j: Pose2::default(),
-            covariance: Matrix3::identity(),
-            question: crate::edge::QuestionId::default(),
-            log_looks: 0.0,
-            factor: 0,
-        };
-        let other = mapper.filter.best().clone();
-        mapper.filter.particles = vec![Particle { edges: Arc::new(vec![edge]), ..other.clone() }, other];
-        let mut effects = Effects::new();
-        mapper.change(&mut effects, |_, _| Effects::new());
-        assert_eq!((effects.len(), mapper.epoch), (0, 0));
-        mapper.change(&mut effects, |filter, _| {
-            filter.particles.swap(0, 1);
-            Effects::new()
-        });
-        assert!(matches!(effects[..], [Effect::Jumped { epoch: 1, .. }]), "{effects:?}");
-    }
-}
+mod tests;

@@ -30,6 +30,7 @@ struct Line<'a> {
     effective_sample_size: f64,
     resampled: bool,
     weights: &'a [(u32, f64)],
+    unresolved: f64,
 }
 
 /// An edge that was measured.
@@ -63,7 +64,7 @@ impl History {
                 self.edges.push(Edge { i, j, kind, taken, reason });
             }
             Effect::Resampled { .. } => self.resampled = true,
-            Effect::Weighed { place, stamp_ns, proposed, weights, effective_sample_size } => {
+            Effect::Weighed { place, stamp_ns, proposed, weights, unresolved, effective_sample_size } => {
                 let line = Line {
                     place: *place,
                     stamp_s: Stamp { ns: *stamp_ns }.seconds(),
@@ -72,6 +73,7 @@ impl History {
                     effective_sample_size: *effective_sample_size,
                     resampled: std::mem::take(&mut self.resampled),
                     weights,
+                    unresolved: *unresolved,
                 };
                 let written = serde_json::to_writer(&mut self.out, &line).map_err(std::io::Error::from);
                 let written = written.and_then(|()| self.out.write_all(b"\n"));

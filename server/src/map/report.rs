@@ -10,8 +10,8 @@ use toponym::log::Notes;
 use toponym_core::Config;
 use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
 use toponym_core::edge::{EdgeKind, PlaceId};
-use toponym_core::effects::{Heard, HeardStatus};
-use toponym_proto::answer::{Candidate, MapIdentity};
+use toponym_core::effects::{Heard, HeardStatus, TrackState};
+use toponym_proto::answer::{Candidate, Difference, MapIdentity};
 use toponym_proto::stream::Stamp;
 
 /// The whole report.
@@ -19,8 +19,14 @@ use toponym_proto::stream::Stamp;
 pub struct Report {
     /// Places of the best graph.
     pub places: Vec<Place>,
-    /// One row per distinct graph, best first; weights sum to one.
+    /// One row per distinct graph, best first; weights sum to one with `unresolved`.
     pub particles: Vec<Particle>,
+    /// Posterior mass of graphs that were dropped.
+    pub unresolved: f64,
+    /// What the best graphs disagree about.
+    pub differences: Vec<Difference>,
+    /// How well the robot knew where it was: an entry at each change.
+    pub states: Vec<Standing>,
     /// Answers to the questions asked.
     pub answers: Vec<Answer>,
     /// What became of the sentences.
@@ -87,6 +93,8 @@ pub struct Answer {
     pub label: Option<String>,
     /// Probability that it is nowhere in the map.
     pub p_none: f64,
+    /// Posterior mass of graphs that were dropped; part of `p_none`.
+    pub unresolved: f64,
     /// Best first.
     pub candidates: Vec<Candidate>,
 }
@@ -147,6 +155,17 @@ pub struct Segment {
     pub reason: String,
 }
 
+/// How well the robot knew where it was.
+#[derive(Debug, Serialize)]
+pub struct Standing {
+    /// From when on.
+    pub stamp_s: f64,
+    /// `mapping`, `localised`, `doubtful` or `lost`.
+    pub state: TrackState,
+    /// In words.
+    pub why: String,
+}
+
 fn seconds(ns: i64) -> f64 {
     Stamp { ns }.seconds()
 }
@@ -165,6 +184,9 @@ pub fn report(
     Report {
         places: graph.places.iter().map(place).collect(),
         particles: graph.particles.iter().map(particle).collect(),
+        unresolved: graph.unresolved,
+        differences: graph.differences.iter().cloned().map(convert::difference).collect(),
+        states: played.states.iter().map(state).collect(),
         answers: answers.into_iter().map(|a| answer(a, robot)).collect(),
         utterances: played.heard.iter().map(utterance).collect(),
         run: Run {
@@ -221,8 +243,13 @@ fn answer(a: WhereAnswer, robot: &str) -> Answer {
         question: reply.name,
         label: reply.resolved.label,
         p_none: reply.p_none,
+        unresolved: reply.unresolved,
         candidates: reply.candidates,
     }
+}
+
+fn state((ns, state, why): &(i64, TrackState, String)) -> Standing {
+    Standing { stamp_s: seconds(*ns), state: *state, why: why.clone() }
 }
 
 fn utterance(h: &Heard) -> Utterance {

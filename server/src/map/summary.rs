@@ -3,9 +3,10 @@
 use super::{Finished, MapArgs, trajectory};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
+use toponym_core::answers::differences::sentence;
 use toponym_core::answers::query::WhereAnswer;
 use toponym_core::edge::EdgeKind;
-use toponym_core::effects::HeardStatus;
+use toponym_core::effects::{HeardStatus, TrackState};
 
 /// A handful of lines.
 pub fn text(args: &MapArgs, done: &Finished) -> String {
@@ -29,6 +30,12 @@ pub fn text(args: &MapArgs, done: &Finished) -> String {
         line("dropped", format!("{count} scans: {reason}"));
     }
     line("map", map(done));
+    if let Some(ways) = sentence(&done.graph.differences) {
+        line("open", ways);
+    }
+    if let Some(state) = state(&played.states) {
+        line("robot", state);
+    }
     if !played.heard.is_empty() {
         let understood = played.heard.iter().filter(|h| h.status == HeardStatus::Understood).count();
         line("sentences", format!("{understood} of {} understood", played.heard.len()));
@@ -61,7 +68,7 @@ fn map(done: &Finished) -> String {
     let count = |kind| kinds.get(&kind).copied().unwrap_or(0);
     format!(
         "{} places on {:.0} m; loop edges: {} distance, {} semantic, {} relocalisation; \
-         best of {} graphs, weight {:.2}",
+         best of {} graphs, weight {:.2}{}",
         done.graph.places.len(),
         trajectory::path_m(&done.trajectory),
         count(EdgeKind::Distance),
@@ -69,7 +76,26 @@ fn map(done: &Finished) -> String {
         count(EdgeKind::Relocalisation),
         done.graph.particles.len(),
         best.map_or(0.0, |p| p.weight),
+        dropped(done.graph.unresolved),
     )
+}
+
+fn dropped(unresolved: f64) -> String {
+    if unresolved < 0.005 { String::new() } else { format!(", {unresolved:.2} in graphs that were dropped") }
+}
+
+/// How well the robot knows where it is in the end, and how often it did not; none if it always did.
+fn state(states: &[(i64, TrackState, String)]) -> Option<String> {
+    let name = |state| match state {
+        TrackState::Mapping => "mapping",
+        TrackState::Localised => "localised",
+        TrackState::Doubtful => "doubtful",
+        TrackState::Lost => "lost",
+    };
+    let times = |state| states.iter().filter(|s| s.1 == state).count();
+    let (doubtful, lost) = (times(TrackState::Doubtful), times(TrackState::Lost));
+    let (_, last, why) = states.last().filter(|_| doubtful + lost > 0)?;
+    Some(format!("{}: {why}; {doubtful} times doubtful, {lost} times lost", name(*last)))
 }
 
 /// A question and its answer, a line per candidate.
@@ -107,9 +133,23 @@ mod tests {
             label: Some("pool".into()),
             via: "unknown".into(),
             p_none: 1.0,
+            unresolved: 0.0,
             candidates: vec![],
             robot: None,
         };
         assert_eq!(told(&answer), "where is the pool\n  100 %  nowhere in this map\n");
+    }
+
+    #[test]
+    fn doubt_is_told_where_there_was_any() {
+        let entry = |state, why: &str| (0, state, why.to_owned());
+        let mut states = vec![entry(TrackState::Mapping, "a")];
+        assert_eq!(state(&states), None);
+        states.extend([entry(TrackState::Lost, "in the dark for 34 m"), entry(TrackState::Mapping, "found")]);
+        assert_eq!(state(&states).unwrap(), "mapping: found; 0 times doubtful, 1 times lost");
+        assert_eq!(
+            (dropped(0.0), dropped(0.25)),
+            (String::new(), ", 0.25 in graphs that were dropped".into())
+        );
     }
 }

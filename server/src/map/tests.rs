@@ -77,7 +77,11 @@ fn the_report_has_what_it_should() {
     folder.map(&[&files[..], &["--ask", "where is the gym"]].concat()).unwrap();
     let report = folder.report("r.json");
     let weights = report["particles"].as_array().unwrap().iter().map(|p| p["weight"].as_f64().unwrap());
-    assert!((weights.sum::<f64>() - 1.0).abs() < 1e-9);
+    assert!((weights.sum::<f64>() + report["unresolved"].as_f64().unwrap() - 1.0).abs() < 1e-9);
+    let states = report["states"].as_array().unwrap();
+    assert_eq!(states[0]["state"], "mapping");
+    assert!(states.iter().all(|s| s["why"].is_string() && s["stamp_s"].is_f64()));
+    assert!(report["differences"].is_array());
     poses_are_those_of_the_places(&report);
     let answer = &report["answers"][0];
     let mass = answer["candidates"].as_array().unwrap().iter().map(|c| c["probability"].as_f64().unwrap());

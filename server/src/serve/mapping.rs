@@ -7,6 +7,7 @@ use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
 use std::time::{Duration, Instant};
 use toponym_core::edge::EdgeKind;
+use toponym_core::effects::TrackState;
 use toponym_core::{Effect, Mapper};
 use toponym_proto::answer::{ANSWER_VERSION, Jump, MapIdentity, PoseOut};
 use toponym_proto::record::{RecordError, RecordWriter};
@@ -149,7 +150,9 @@ impl Mapping {
     /// One message of the map's stream, and its effects out.
     fn take(&mut self, message: Message) {
         let effects = self.step(message);
-        if effects.iter().any(|e| matches!(e, Effect::Heard(_) | Effect::Jumped { .. })) {
+        let told =
+            |e: &Effect| matches!(e, Effect::Heard(_) | Effect::Jumped { .. } | Effect::StateChanged { .. });
+        if effects.iter().any(told) {
             // Who is told of it may ask at once.
             self.show();
         } else if !effects.is_empty() {
@@ -191,6 +194,14 @@ impl Mapping {
                 let jump = Jump { v: ANSWER_VERSION, map: map_identity, new_from_old };
                 self.outbox.send(keys.jump(map), &jump);
             }
+            Effect::StateChanged {
+                stamp_ns,
+                state: state @ (TrackState::Doubtful | TrackState::Lost),
+                why,
+            } => {
+                warn!(map, stamp_ns, ?state, "{why}");
+            }
+            Effect::StateChanged { stamp_ns, state, why } => info!(map, stamp_ns, ?state, "{why}"),
             Effect::ScanDropped { stamp_ns, reason } => warn!(map, stamp_ns, "scan dropped: {reason}"),
             // Walking round a block brings hundreds of these; what words bring is rare.
             Effect::EdgeAccepted { kind: EdgeKind::Distance, reason, .. } => debug!(map, "{reason}"),

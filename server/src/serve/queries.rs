@@ -6,7 +6,9 @@ use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use toponym_core::{Answer, Query};
+use toponym_core::answers::snapshot::asks_of_robot;
+use toponym_core::effects::TrackState;
+use toponym_core::{Answer, Query, Snapshot};
 use toponym_proto::answer::{ANSWER_VERSION, Done, ErrorCode, Info, Mended, Problem};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
@@ -142,7 +144,9 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
         Ask::Where => {
             let [name, text, robot] = take(arguments, ["name", "text", "robot"])?;
             check_robot(map, robot.as_deref())?;
-            where_query(name, text)?
+            let query = where_query(name, text)?;
+            check_localised(&snapshot, &query, robot.is_some())?;
+            query
         }
         Ask::Labels | Ask::Graph => {
             let [] = take(arguments, [])?;
@@ -189,6 +193,17 @@ fn check_robot(map: &MapView, robot: Option<&str>) -> Result<(), Problem> {
         }
         _ => Ok(()),
     }
+}
+
+/// What counts from the robot can't be told of one that is lost; all else stands in the map's frame.
+fn check_localised(snapshot: &Snapshot, query: &Query, of_robot: bool) -> Result<(), Problem> {
+    let of_robot = of_robot || matches!(query, Query::Where { text } if asks_of_robot(text));
+    if of_robot && snapshot.state() == TrackState::Lost {
+        let message = "the robot doesn't know where it is";
+        let hint = "ask without robot= for where things are in the map";
+        return Err(Problem::new(ErrorCode::NotLocalised, message).field("robot").hint(hint));
+    }
+    Ok(())
 }
 
 fn resolution_m(text: &str) -> Result<f64, Problem> {

@@ -76,13 +76,18 @@ impl Checkpoint {
         self.graphs.iter().filter(|g| !g.1.contains(&true)).fold(0.0, |sum, g| sum + g.0)
     }
 
+    /// Mass of the graphs that were dropped.
+    fn unresolved(&self) -> f64 {
+        (1.0 - self.graphs.iter().map(|g| g.0).sum::<f64>()).max(0.0)
+    }
+
     /// The best graph's weight, and whether it is of the truth.
     pub fn best(&self) -> Option<(f64, bool)> {
         self.graphs.first().map(|(weight, of)| (*weight, of.first() == Some(&true)))
     }
 
-    /// Distance in total variation from a reference's masses of the hypotheses. What is of none is a
-    /// class of its own; what is of several is shared among them as the reference shares it, so that what
+    /// Distance in total variation from a reference's masses of the hypotheses. What is of none, or was
+    /// dropped, is a class of its own; what is of several is shared among them as the reference shares it, so that what
     /// nobody can tell apart yet is no distance.
     pub fn total_variation(&self, reference: &[f64]) -> f64 {
         let mut mass = vec![0.0; reference.len()];
@@ -95,7 +100,7 @@ impl Checkpoint {
         }
         let rest = (1.0 - reference.iter().sum::<f64>()).max(0.0);
         let apart: f64 = mass.iter().zip(reference).map(|(a, b)| (a - b).abs()).sum();
-        0.5 * (apart + (self.mass_of_none() - rest).abs())
+        0.5 * (apart + (self.mass_of_none() + self.unresolved() - rest).abs())
     }
 }
 
@@ -159,6 +164,8 @@ mod tests {
         let checkpoint = Checkpoint::new(&graphs(60, particles), &truth());
         assert!((checkpoint.total_variation(&[1.0, 0.0]) - 0.4).abs() < 1e-12);
         assert!(checkpoint.total_variation(&[0.6, 0.4]) < 1e-12);
+        let dropped = Checkpoint::new(&graphs(60, vec![weighed(0.6, true_map())]), &truth());
+        assert!((dropped.total_variation(&[1.0, 0.0]) - 0.4).abs() < 1e-12, "it might be anything");
         let none = Particle { edges: false_edge(), ..true_map() };
         let lost = Checkpoint::new(&graphs(60, vec![none]), &truth());
         assert!((lost.total_variation(&[0.5, 0.5]) - 1.0).abs() < 1e-12);

@@ -28,7 +28,7 @@ pub struct Mapped {
     pub trajectory: Vec<(f64, Pose2)>,
     /// What was answered at the end.
     pub answers: Vec<Answer>,
-    /// Revisits left undecided, if the mapper tells of them.
+    /// Posterior mass of graphs that were dropped, at the end, if the mapper tells of it.
     pub unresolved: Option<f64>,
     /// Processor time per second of tour, if known.
     pub cpu_ms_per_s: Option<f64>,
@@ -76,7 +76,7 @@ pub struct Outcome {
     pub labels: Share,
     /// Questions answered rightly.
     pub answers: Share,
-    /// Revisits left undecided, if told.
+    /// Posterior mass of graphs that were dropped, if told.
     pub unresolved: Option<f64>,
     /// Processor time per second of tour, if known.
     pub cpu_ms_per_s: Option<f64>,

@@ -156,6 +156,7 @@ mod tests {
             map: MapIdentity::default(),
             stamp: toponym_proto::Stamp::default(),
             p_none: 0.1,
+            unresolved: 0.0,
             candidates,
         }
     }

@@ -48,11 +48,14 @@ pub struct WhereAnswer {
     pub label: Option<String>,
     /// How the name was found: `exact` or `unknown`.
     pub via: String,
-    /// Probability that it is nowhere in the map. Sums to one with the candidates'.
+    /// Probability that it is nowhere in the map, or that the map is none of those kept. Sums to one with
+    /// the candidates'.
     pub p_none: f64,
+    /// Posterior mass of graphs that were dropped; part of `p_none`.
+    pub unresolved: f64,
     /// Best first.
     pub candidates: Vec<Candidate>,
-    /// Newest pose of the robot in the map, if any.
+    /// Newest pose of the robot in the map, if it has one and is not lost.
     pub robot: Option<Pose2>,
 }
 
@@ -117,7 +120,7 @@ pub struct EdgeView {
 pub struct ParticleView {
     /// Particles that hold it.
     pub count: u32,
-    /// Their weight together; all sum to one.
+    /// Their weight together; all sum to one with what is unresolved.
     pub weight: f64,
     /// Its loop edges.
     pub edges: Vec<EdgeView>,
@@ -137,8 +140,21 @@ pub struct GraphAnswer {
     pub places: Vec<PlaceView>,
     /// Distinct graphs, best first.
     pub particles: Vec<ParticleView>,
-    /// 1 / Σ w² over particles.
+    /// Posterior mass of graphs that were dropped; sums to one with the particles' weights.
+    pub unresolved: f64,
+    /// What the best graphs disagree about; empty where one is all there is.
+    pub differences: Vec<Difference>,
+    /// 1 / Σ w² over particles, among those kept.
     pub effective_sample_size: f64,
+}
+
+/// One way that the map can be, in what it differs from the others told.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// Weight of the graph.
+    pub weight: f64,
+    /// "place 41 is place 7 again, place 60 is new ground".
+    pub words: String,
 }
 
 /// Occupancy grid. Row 0 has the lowest y.

@@ -1,18 +1,22 @@
 //! The posterior at one moment, immutable: what questions are answered from, over all particles.
 
+use crate::answers::differences::differences;
 use crate::answers::grid::grid;
 use crate::answers::query::{
-    Answer, Candidate, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query, WhereAnswer,
+    Answer, Candidate, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query,
+    WhereAnswer,
 };
 use crate::answers::whereabouts::{Region, SAME_REGION_M, Whereabouts, whereabouts};
 use crate::edge::{PlaceId, Vertex};
+use crate::effects::TrackState;
 use crate::filter::Filter;
 use crate::filter::labels::LabelId;
 use crate::filter::particle::Particle;
 use crate::filter::prune::effective_sample_size;
 use crate::geometry::Pose2;
 use crate::graph::Place;
-use crate::language::{self, Name};
+use crate::language::act::{About, Head, Question};
+use crate::language::{self, Content, Name};
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::front::OpenPlace;
@@ -27,6 +31,22 @@ const NAMES_MAX: usize = 5;
 /// Less probable names and candidates are noise.
 const PROBABILITY_MIN: f64 = 0.02;
 
+/// Places are called by a name in what graphs differ about, if it likely applies.
+const CALLED_MIN: f64 = 0.5;
+
+/// The robot at one moment, and the map's counters.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Now {
+    /// Its pose in the best particle's map.
+    pub robot: Option<Pose2>,
+    /// Whether to believe it.
+    pub state: TrackState,
+    /// +1 when the map's coordinates jump.
+    pub epoch: u64,
+    /// +1 per change.
+    pub rev: u64,
+}
+
 /// The posterior at one moment.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
@@ -39,49 +59,36 @@ pub struct Snapshot {
     /// Posterior mass of graphs that were dropped.
     unresolved: f64,
     ledger: Arc<Ledger>,
-    robot: Option<Pose2>,
-    epoch: u64,
-    rev: u64,
+    now: Now,
 }
 
 impl Snapshot {
-    pub(crate) fn new(
-        filter: &Filter,
-        ledger: Arc<Ledger>,
-        open: Vec<OpenPlace>,
-        robot: Option<Pose2>,
-        (epoch, rev): (u64, u64),
-    ) -> Self {
+    pub(crate) fn new(filter: &Filter, ledger: Arc<Ledger>, open: Vec<OpenPlace>, now: Now) -> Self {
         let places = filter.graph.places().to_vec();
         let poses = poses(filter.best(), &places, &open);
         let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
-        Self {
-            places,
-            open,
-            structure,
-            particles,
-            poses,
-            unresolved: filter.unresolved(),
-            ledger,
-            robot,
-            epoch,
-            rev,
-        }
+        let unresolved = filter.unresolved();
+        Self { places, open, structure, particles, poses, unresolved, ledger, now }
     }
 
     /// +1 when the map's coordinates jump.
     pub fn epoch(&self) -> u64 {
-        self.epoch
+        self.now.epoch
     }
 
     /// +1 per change.
     pub fn rev(&self) -> u64 {
-        self.rev
+        self.now.rev
     }
 
     /// Newest pose of the robot in the map.
     pub fn robot(&self) -> Option<Pose2> {
-        self.robot
+        self.now.robot
+    }
+
+    /// Whether to believe that pose.
+    pub fn state(&self) -> TrackState {
+        self.now.state
     }
 
     /// Answers a question; never fails: not knowing is an answer.
@@ -119,12 +126,23 @@ impl Snapshot {
             })
             .collect();
         GraphAnswer {
-            epoch: self.epoch,
-            rev: self.rev,
+            epoch: self.now.epoch,
+            rev: self.now.rev,
             places,
             particles: self.particles.iter().map(|p| self.particle(p)).collect(),
+            unresolved: self.unresolved,
+            differences: self.differences(),
             effective_sample_size: effective_sample_size(&self.particles),
         }
+    }
+
+    /// What the best graphs disagree about.
+    pub fn differences(&self) -> Vec<Difference> {
+        let called = |id: PlaceId| {
+            let (name, p) = self.names_of(id as Vertex).into_iter().next()?;
+            (p >= CALLED_MIN).then_some(name)
+        };
+        differences(&self.particles, 1.0 - self.unresolved, called)
     }
 
     fn particle(&self, p: &Particle) -> ParticleView {
@@ -136,7 +154,7 @@ impl Snapshot {
         });
         ParticleView {
             count: 1,
-            weight: p.weight(),
+            weight: (1.0 - self.unresolved) * p.weight(),
             edges: edges.collect(),
             poses: poses(p, &self.places, &self.open),
         }
@@ -208,8 +226,10 @@ impl Snapshot {
             label: name.map(|n: Name| n.as_str().to_owned()),
             via: if label.is_some() { "exact" } else { "unknown" }.to_owned(),
             p_none: 1.0,
+            unresolved: self.unresolved,
             candidates: Vec::new(),
-            robot: self.robot,
+            // Who is lost is nowhere to count distances from.
+            robot: self.now.robot.filter(|_| self.now.state != TrackState::Lost),
         };
         let Some(label) = label else { return answer };
         let poses = |p: &Particle| poses(p, &self.places, &self.open);
@@ -276,6 +296,15 @@ impl Snapshot {
     }
 }
 
+/// Whether a question is about the robot's own place: "where am I?" Who is lost can't be told.
+pub fn asks_of_robot(text: &str) -> bool {
+    let of_here = |content: &Content| match content {
+        Content::Ask { kind: Question::Where, about: About::Phrase(phrase) } => phrase.head == Head::Here,
+        _ => false,
+    };
+    language::parse(text).acts().iter().any(|act| of_here(&act.content))
+}
+
 /// Poses of all places, open ones too, in a particle's map.
 fn poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> {
     let mut poses = p.belief.poses();
@@ -300,3 +329,6 @@ pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Ve
     };
     open.iter().map(|o| map_from_front.compose(&o.front_from_place)).collect()
 }
+
+#[cfg(test)]
+mod tests;

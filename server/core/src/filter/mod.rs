@@ -118,7 +118,8 @@ impl Filter {
             place: t.into(),
             stamp_ns: self.graph.place(t).stamp_ns,
             proposed,
-            weights: self.particles.iter().map(|p| (1, p.weight())).collect(),
+            weights: self.particles.iter().map(|p| (1, (1.0 - self.unresolved()) * p.weight())).collect(),
+            unresolved: self.unresolved(),
             effective_sample_size,
         }
     }
@@ -310,7 +311,9 @@ impl Filter {
         } else {
             difference(&self.particles[child.parent], self.best()).map(|g| Ghost { log_odds, ..g })
         };
-        ghost.into_iter().for_each(|g| self.ghosts.drop_answer(g));
+        if let Some(ghost) = ghost {
+            self.ghosts.drop_answer(ghost);
+        }
     }
 
     /// Makes a stretch of the chain one that particles may let go.

@@ -39,6 +39,8 @@ const DARK_PATH_M: f64 = 3.0;
 const VAGUE_PATH_M: f64 = 2.0;
 const VAGUE_M: f64 = 0.15;
 const VAGUE_RAD: f64 = 0.07;
+/// Of an edge's path so much without a look at anything makes it one of the dark.
+const UNSEEN_SHARE: f64 = 0.5;
 /// What each end of an increment, and the slow bend of the local map, add to it per root metre of
 /// path, as a multiple of the roughness. From simulated offices, where this is three to five times too wide
 /// (example `drives` of the server), and a real log, where it just covers: clutter errs more than noise does.
@@ -103,6 +105,9 @@ pub struct Placed {
     pub began: bool,
     /// Places that this scan froze, oldest first.
     pub frozen: Vec<FrozenPlace>,
+    /// How the body's pose in the front end's frame was corrected without a motion, if it was: a blind
+    /// stretch was bridged.
+    pub new_from_old: Option<Pose2>,
 }
 
 /// State of the front end.
@@ -134,6 +139,8 @@ pub struct FrontEnd {
     open: VecDeque<OpenPlace>,
     /// A blind stretch that is not dealt with yet.
     dark: Option<Dark>,
+    /// Places that no scan ties to the one before, ascending.
+    unseen: Vec<PlaceId>,
     /// The local map; a function of `keys`.
     #[serde(skip)]
     local: Option<LocalMap>,
@@ -160,6 +167,7 @@ impl FrontEnd {
             keys: VecDeque::new(),
             open: VecDeque::new(),
             dark: None,
+            unseen: Vec::new(),
             local: None,
         }
     }
@@ -187,6 +195,26 @@ impl FrontEnd {
     /// Covariance of the body relative to the place held.
     pub fn since_place(&self) -> Matrix3<f64> {
         self.since_place.covariance(&self.wheels)
+    }
+
+    /// Stamp of the newest scan; none before the first.
+    pub fn newest_ns(&self) -> Option<StampNs> {
+        self.odom_from_body.map(|_| self.stamp_ns)
+    }
+
+    /// Path since the scans last told the pose.
+    pub fn unseen_m(&self) -> f64 {
+        self.wheels.unseen_m()
+    }
+
+    /// Whether the newest motion is odometry's alone, too far to be a scan or two that failed.
+    pub fn sees_nothing(&self) -> bool {
+        self.unseen_m() > UNSEEN_SHARE * self.spacing_m
+    }
+
+    /// Whether only odometry ties a place to the one before.
+    pub fn was_unseen(&self, place: PlaceId) -> bool {
+        self.unseen.binary_search(&place).is_ok()
     }
 
     /// Takes a scan with the odometry at its stamp.
@@ -220,15 +248,18 @@ impl FrontEnd {
         if !blind {
             self.keep_key(sweep);
         }
+        let old = self.front_from_body;
         if began {
             self.bridge();
         }
+        let new = self.front_from_body;
+        let new_from_old = (new != old).then(|| new.compose(&old.inverse()));
         frozen.extend(self.freeze(self.path_m - CONTENT_REACH_M));
         let (place, place_from_body) = self
             .open
             .back()
             .map_or((0, Pose2::default()), |p| (p.id, p.front_from_place.between(&self.front_from_body)));
-        Placed { place, place_from_body, began, frozen }
+        Placed { place, place_from_body, began, frozen, new_from_old }
     }
 
     /// Freezes every place that began at or before a point of the path.
@@ -299,6 +330,9 @@ impl FrontEnd {
         let previous_from_this = self.newest_place.between(&self.front_from_body);
         self.newest_place = self.front_from_body;
         let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
+        if self.unseen_m() > UNSEEN_SHARE * d_m {
+            self.unseen.push(self.next_place);
+        }
         let bend = Matrix3::from_diagonal(&BEND.component_mul(&BEND)) * ((1.0 + d_m) * self.rough_m.powi(2));
         let in_the_dark = self.ends_in_the_dark(self.next_place);
         // Systematic errors in the dark add up over all of it, and are dealt out once it is over.

@@ -44,6 +44,8 @@ pub struct Placed {
     pub frozen: Vec<FrozenPlace>,
     /// Odometry at the scan.
     pub odom_from_body: Pose2,
+    /// How the body's pose in the front end's frame was corrected without a motion, if it was.
+    pub new_from_old: Option<Pose2>,
 }
 
 impl Track {
@@ -116,7 +118,8 @@ impl Track {
         if placed.began {
             effects.push(Effect::PlaceBegan { place, stamp_ns });
         }
-        Some(Placed { began: placed.began, frozen: placed.frozen, odom_from_body })
+        let front::Placed { began, frozen, new_from_old, .. } = placed;
+        Some(Placed { began, frozen, odom_from_body, new_from_old })
     }
 }
 

@@ -49,7 +49,7 @@ fn hall(y_m: f64, pillar: bool) -> Vec<[f64; 4]> {
 }
 
 /// Out of the first hall, round the yard, and into the hall at `y_m`, as far as `x_m`.
-fn drive(y_m: f64, x_m: f64) -> Vec<Pose2> {
+pub fn drive(y_m: f64, x_m: f64) -> Vec<Pose2> {
     let corners = [(3.0, 0.0), (30.0, 0.0), (30.0, 14.0), (24.0, 14.0), (24.0, y_m), (x_m, y_m)];
     let mut poses = vec![Pose2::new(3.0, 0.0, 0.0)];
     for (from, to) in corners.iter().zip(&corners[1..]) {
@@ -69,7 +69,7 @@ fn drive(y_m: f64, x_m: f64) -> Vec<Pose2> {
 }
 
 /// The drive's events: in the yard the laser sees nothing, and wheels slip by some per cent either way.
-fn events(poses: &[Pose2]) -> Vec<Event> {
+pub fn events(poses: &[Pose2]) -> Vec<Event> {
     let laser = Laser { range_max_m: 6.0, ..laser() };
     let walls: Vec<[f64; 4]> = [hall(0.0, true), hall(APART_M, false)].concat();
     let mut events = vec![Event::Setup(Setup { robot: "r".into(), lasers: vec![laser.clone()] })];

@@ -1,6 +1,7 @@
 //! The core from events to answers, on a simulated ring corridor.
 
 mod alike;
+mod standing;
 mod talk;
 mod world;
 

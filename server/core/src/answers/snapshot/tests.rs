@@ -1,0 +1,62 @@
+use super::*;
+use crate::config::Config;
+use crate::edge::EdgeKind;
+use crate::filter::particle::Edge;
+
+/// Two graphs, and a quarter of the posterior is neither.
+fn torn(state: TrackState) -> Snapshot {
+    let edge = Edge {
+        i: 7,
+        j: 41,
+        kind: EdgeKind::Distance,
+        i_from_j: Pose2::default(),
+        covariance: Matrix3::identity(),
+        question: crate::edge::QuestionId::default(),
+        log_looks: 0.0,
+        factor: 0,
+    };
+    let mut filter = Filter::new(Config::default());
+    let other = Particle { log_weight: 0.4_f64.ln(), ..Particle::empty() };
+    let best = Particle { edges: Arc::new(vec![edge]), log_weight: 0.6_f64.ln(), ..Particle::empty() };
+    filter.particles = vec![best, other];
+    let now = Now { robot: Some(Pose2::default()), state, epoch: 0, rev: 0 };
+    Snapshot { unresolved: 0.25, ..Snapshot::new(&filter, Arc::default(), Vec::new(), now) }
+}
+
+#[test]
+fn weights_sum_to_one_with_what_is_unresolved() {
+    let graph = torn(TrackState::Mapping).graph();
+    let weights: Vec<f64> = graph.particles.iter().map(|p| p.weight).collect();
+    assert!((weights[0] - 0.45).abs() < 1e-12 && (weights[1] - 0.3).abs() < 1e-12, "{weights:?}");
+    assert!((weights.iter().sum::<f64>() + graph.unresolved - 1.0).abs() < 1e-12);
+    assert_eq!(graph.differences[0].words, "place 41 is place 7 again");
+    assert!((graph.differences[1].weight - 0.3).abs() < 1e-12);
+}
+
+#[test]
+fn an_answer_leaves_what_is_unresolved_to_nowhere() {
+    let answer = torn(TrackState::Doubtful).where_is("gym");
+    assert_eq!((answer.p_none, answer.unresolved), (1.0, 0.25));
+}
+
+#[test]
+fn only_who_is_lost_is_nowhere() {
+    for (state, known) in
+        [(TrackState::Mapping, true), (TrackState::Doubtful, true), (TrackState::Lost, false)]
+    {
+        assert_eq!(torn(state).where_is("gym").robot.is_some(), known);
+    }
+}
+
+#[test]
+fn where_am_i_asks_for_the_robot_and_nothing_else_does() {
+    for (text, of_robot) in [
+        ("where am I", true),
+        ("where are we?", true),
+        ("where is the gym", false),
+        ("gym", false),
+        ("how do I get to the library from here", false),
+    ] {
+        assert_eq!(asks_of_robot(text), of_robot, "{text}");
+    }
+}
