@@ -280,6 +280,7 @@ pub fn tie(utterance: u32) -> LabelId {
 #[allow(clippy::float_cmp)]
 mod tests {
     use super::*;
+    use crate::filter::naming::BASE;
 
     fn said(utterance: u32, label: LabelId, place: Vertex, source: Source) -> Evidence {
         Evidence::new(utterance, label, place, DIRECT, source)
@@ -295,7 +296,7 @@ mod tests {
             l.add(said(k, k, 100 + k, Source::Direct));
         }
         assert_eq!(before, l.similarity(3, 90));
-        assert!((before - 0.25).abs() < 1e-12);
+        assert!((before - (1.0 / (1.0 + BASE)).powi(2)).abs() < 1e-12);
         assert_eq!(l.similarity(200, 201), 0.0, "unlabelled places have nothing in common");
     }
 

@@ -277,8 +277,9 @@ impl Filter {
         let log_sum = all.iter().map(|c| c.log_weight).fold(f64::NEG_INFINITY, log_add);
         let worth = all.partition_point(|c| c.log_weight >= log_sum + KEPT_MIN.ln());
         let dropped = all.split_off(worth.min(self.config.particles.max(1) as usize).max(1));
+        let log_kept = all.iter().map(|c| c.log_weight).fold(f64::NEG_INFINITY, log_add);
         for child in &dropped {
-            self.drop_child(edge, child, log_sum);
+            self.drop_child(edge, child, log_kept);
         }
         let adds = |c: &Child| c.there && c.adds && (wanted || c.is_new);
         let entered =
@@ -292,7 +293,7 @@ impl Filter {
         };
         let born: Vec<Option<Particle>> = all.par_iter().map(birth).collect();
         for child in all.iter().zip(&born).filter_map(|(c, born)| born.is_none().then_some(c)) {
-            self.drop_child(edge, child, log_sum);
+            self.drop_child(edge, child, log_kept);
         }
         let particles: Vec<Particle> = born.into_iter().flatten().collect();
         if !particles.is_empty() {
@@ -304,8 +305,8 @@ impl Filter {
         self.particles.iter().filter(there).map(Particle::weight).sum()
     }
 
-    fn drop_child(&mut self, edge: &Edge, child: &Child, log_sum: f64) {
-        let log_odds = child.log_weight - log_sum;
+    fn drop_child(&mut self, edge: &Edge, child: &Child, log_kept: f64) {
+        let log_odds = child.log_weight - log_kept;
         let ghost = if child.is_new {
             Some(Ghost { edge: edge.clone(), there: child.there, log_odds, since: 0.0 })
         } else {
@@ -350,8 +351,10 @@ impl Filter {
         self.particles = merge(&self.structure, std::mem::take(&mut self.particles));
         let dropped = keep_best(&mut self.particles, self.config.particles.max(1) as usize);
         let best = &self.particles[0];
-        let ghosts = dropped.iter().filter_map(|p| difference(p, best));
-        ghosts.for_each(|g| self.ghosts.drop_answer(g));
+        let kept = 1.0 - dropped.iter().map(Particle::weight).sum::<f64>();
+        for ghost in dropped.iter().filter_map(|p| difference(p, best)) {
+            self.ghosts.drop_answer(Ghost { log_odds: ghost.log_odds - kept.ln(), ..ghost });
+        }
         self.ghosts.forget();
     }
 

@@ -83,7 +83,9 @@ fn a_name_speaks_for_the_map_in_which_it_was_said_nearby() {
 #[test]
 fn the_same_again_and_another_one_say_opposite_things() {
     assert!(gym(1.0, Sameness::Same) > 3.0);
-    assert!((gym(25.0, Sameness::Same) - FALSE_TALK.ln()).abs() < 1e-3);
+    // Another of its kind may be meant.
+    let elsewhere = gym(25.0, Sameness::Same);
+    assert!(elsewhere < -0.5 && elsewhere > FALSE_TALK.ln(), "{elsewhere}");
     assert!(gym(1.0, Sameness::Other) < -1.0 && gym(25.0, Sameness::Other).abs() < 1e-6);
 }
 

@@ -37,10 +37,10 @@ const LOOK_PATH_PER_RAD_M: f64 = 2.0;
 /// may look like what it was carried to.
 const RESUMED: f64 = 0.2;
 /// φ where a scan that shows something is laid on nothing, or hardly.
-const UNREGISTERED: f64 = 0.1;
-const HARDLY_REGISTERED: f64 = 0.01;
+const UNREGISTERED: f64 = 0.03;
+const HARDLY_REGISTERED: f64 = 0.003;
 /// φ where scans and wheels part by so much, distance².
-const PARTED: [(f64, f64); 3] = [(16.0, 0.003), (36.0, 0.03), (100.0, 0.2)];
+const PARTED: [(f64, f64); 2] = [(36.0, 0.003), (100.0, 0.02)];
 
 impl FrontEnd {
     /// Registers the scan to the local map around the prediction; what it says is fused.
