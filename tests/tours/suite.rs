@@ -204,7 +204,8 @@ mod tests {
             let mass: f64 = outcome.reference.unwrap().mass[3].iter().sum();
             assert!((mass - 1.0).abs() < 1e-9, "{mass}");
             for graphs in outcome.checkpoints.iter().map(|c| &c.as_ref().unwrap().graphs) {
-                assert!((graphs.iter().map(|g| g.0).sum::<f64>() - 1.0).abs() < 1e-9);
+                let kept: f64 = graphs.iter().map(|g| g.0).sum();
+                assert!(kept > 0.5 && kept < 1.0 + 1e-9, "the rest is unresolved");
             }
         }
     }

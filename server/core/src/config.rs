@@ -41,8 +41,6 @@ pub struct Config {
     pub place_spacing_m: f64,
     /// γ of eq. (6).
     pub gamma_per_m2: f64,
-    /// Resample when the effective sample size falls below this share of the particles.
-    pub resample_below: f64,
 }
 
 impl Default for Config {
@@ -56,7 +54,6 @@ impl Default for Config {
             loops: true,
             place_spacing_m: 1.0,
             gamma_per_m2: 0.2,
-            resample_below: 0.5,
         }
     }
 }

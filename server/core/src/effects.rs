@@ -141,11 +141,6 @@ pub enum Effect {
         /// Effective sample size among those kept, before any resampling.
         effective_sample_size: f64,
     },
-    /// Particles were resampled.
-    Resampled {
-        /// Effective sample size before.
-        effective_sample_size: f64,
-    },
     /// How well the robot knows where it is has changed. Comes with the first scan, too.
     StateChanged {
         /// Stamp of the newest scan.

@@ -15,7 +15,6 @@ pub struct History {
     path: PathBuf,
     out: BufWriter<File>,
     edges: Vec<Edge>,
-    resampled: bool,
     /// The first failure to write; told at the end.
     failed: Option<std::io::Error>,
 }
@@ -28,7 +27,6 @@ struct Line<'a> {
     proposed: &'a [Proposal],
     edges: Vec<Edge>,
     effective_sample_size: f64,
-    resampled: bool,
     weights: &'a [(u32, f64)],
     unresolved: f64,
 }
@@ -49,7 +47,7 @@ impl History {
     pub fn create(path: &Path) -> Result<Self> {
         let file = File::create(path).with_context(|| format!("--history {}", path.display()))?;
         let out = BufWriter::new(file);
-        Ok(Self { path: path.to_owned(), out, edges: Vec::new(), resampled: false, failed: None })
+        Ok(Self { path: path.to_owned(), out, edges: Vec::new(), failed: None })
     }
 
     /// Takes the next effect; a place's line is written when its step is over.
@@ -63,7 +61,6 @@ impl History {
                 let (i, j, kind, taken, reason) = (*i, *j, *kind, 0.0, reason.clone());
                 self.edges.push(Edge { i, j, kind, taken, reason });
             }
-            Effect::Resampled { .. } => self.resampled = true,
             Effect::Weighed { place, stamp_ns, proposed, weights, unresolved, effective_sample_size } => {
                 let line = Line {
                     place: *place,
@@ -71,7 +68,6 @@ impl History {
                     proposed,
                     edges: std::mem::take(&mut self.edges),
                     effective_sample_size: *effective_sample_size,
-                    resampled: std::mem::take(&mut self.resampled),
                     weights,
                     unresolved: *unresolved,
                 };

@@ -208,7 +208,6 @@ impl Mapping {
             Effect::EdgeAccepted { weight, reason, .. } => info!(map, weight, "{reason}"),
             Effect::SegmentBegan { stamp_ns, reason } => warn!(map, stamp_ns, "new segment: {reason}"),
             Effect::EdgeRefused { reason, .. } => debug!(map, "{reason}"),
-            Effect::Resampled { effective_sample_size } => debug!(map, effective_sample_size, "resampled"),
             Effect::Mended(done) => info!(map, "mended: {done:?}"),
             Effect::PlaceBegan { .. } | Effect::ScanPlaced { .. } | Effect::Weighed { .. } => {}
         }

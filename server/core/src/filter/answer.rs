@@ -3,8 +3,7 @@
 //! told as unresolved ([`crate::filter::ghosts`]).
 
 use crate::edge::{QuestionId, Vertex};
-use crate::filter::failure::LetGo;
-use crate::filter::particle::{Edge, Particle};
+use crate::filter::particle::{Edge, LetGo, Particle};
 use crate::filter::question::{Question, Testimony};
 use crate::filter::weigh::Judgement;
 use crate::filter::words::Words;

@@ -15,7 +15,7 @@
 
 use crate::edge::Vertex;
 use crate::filter::chance::log_add;
-use crate::filter::particle::{Edge, Particle};
+use crate::filter::particle::{Edge, LetGo, Particle};
 use crate::geometry::Pose2;
 use crate::graph::Graph;
 use std::f64::consts::TAU;
@@ -27,15 +27,6 @@ const SLIPPED: (f64, [f64; 3]) = (0.4, [1.5, 0.2, 0.15]);
 const TURNED: (f64, [f64; 2]) = (0.4, [0.4, 0.4]);
 const ANYWHERE: f64 = 0.2;
 const ANYWHERE_M2: f64 = 400.0;
-
-/// A stretch let go: the poses from `from` on are moved rigidly.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct LetGo {
-    /// The place whose edge from the one before failed.
-    pub from: Vertex,
-    /// What was at p is at `moved ∘ p`.
-    pub moved: Pose2,
-}
 
 /// log Σ_s φ_s f_s(δ_s) of an edge that the particle's chain does not explain, in m⁻² rad⁻¹, and the
 /// likeliest stretch.
@@ -74,8 +65,6 @@ fn log_f(off: &Pose2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::loops::tests::straight;
-    use crate::filter::weigh::tests::{chain, edge, fit};
 
     #[test]
     fn where_a_robot_is_that_lost_its_way_is_a_density() {
@@ -94,27 +83,5 @@ mod tests {
             }
         }
         assert!((mass - 1.0).abs() < 0.03, "{mass}");
-    }
-
-    #[test]
-    fn the_stretch_that_contradicts_itself_is_let_go_and_the_rest_moves_rigidly() {
-        let (_, p) = chain(21, 0.01);
-        let mut graph = straight(21);
-        graph.doubt(13, 0.3);
-        let e = edge(&fit(17.0, 0.9, 6));
-        let (log, let_go) = log_failed(&graph, &p, &e).unwrap();
-        assert_eq!(let_go.from, 13);
-        assert!((let_go.moved.compose(&p.belief.pose(20)).x_m - 17.0).abs() < 1e-6);
-        assert!(log > (0.3 * 0.001_f64).ln(), "{log}");
-    }
-
-    #[test]
-    fn a_failure_before_an_older_loop_explains_nothing() {
-        let (_, mut p) = chain(21, 0.01);
-        let mut tie = edge(&fit(19.0, 0.9, 6));
-        tie.j = 19;
-        p.add(Edge { factor: 0, ..tie });
-        let (_, let_go) = log_failed(&straight(21), &p, &edge(&fit(17.0, 0.9, 6))).unwrap();
-        assert_eq!(let_go.from, 20);
     }
 }

@@ -12,7 +12,7 @@
 
 use crate::edge::QuestionId;
 use crate::filter::chance::log_add;
-use crate::filter::particle::Edge;
+use crate::filter::particle::{Edge, Particle};
 use serde::{Deserialize, Serialize};
 
 /// Odds from which a dropped answer comes back.
@@ -97,6 +97,17 @@ impl Ghosts {
     pub fn unresolved(&self) -> f64 {
         1.0 - self.ghosts.iter().map(|g| 1.0 - g.share()).product::<f64>()
     }
+}
+
+/// The newest answer that tells a dropped particle from the best: with odds as if it weighed alone.
+pub fn difference(dropped: &Particle, best: &Particle) -> Option<Ghost> {
+    let edge_of = |p: &Particle, other: &Particle| {
+        p.edges.iter().filter(|e| !other.holds(e.question)).max_by_key(|e| e.question).cloned()
+    };
+    let (theirs, ours) = (edge_of(dropped, best), edge_of(best, dropped));
+    let there = theirs.as_ref().map(|e| e.question) > ours.as_ref().map(|e| e.question);
+    let edge = if there { theirs } else { ours }?;
+    Some(Ghost { edge, there, log_odds: dropped.log_weight, since: 0.0 })
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ pub mod particle;
 pub mod propose;
 pub mod prune;
 pub mod question;
+mod reasons;
 mod reopen;
 pub(crate) mod second_look;
 pub mod weigh;
@@ -26,12 +27,13 @@ use crate::effects::{Effect, Effects};
 use crate::filter::absence::pay;
 use crate::filter::answer::{Child, Stance, born, children, stance};
 use crate::filter::chance::{log_add, log_looks};
-use crate::filter::ghosts::{Ghost, Ghosts};
+use crate::filter::ghosts::{Ghost, Ghosts, difference};
 use crate::filter::loops::{Fit, Loops, Measured, measure_again};
 use crate::filter::particle::{Edge, Particle};
 use crate::filter::propose::propose;
 use crate::filter::prune::{KEPT_MIN, effective_sample_size, keep_best, merge, normalise, rank};
 use crate::filter::question::{Questions, Testimony};
+use crate::filter::reasons::{refusals, report};
 use crate::filter::second_look::SecondLooks;
 use crate::filter::weigh::{Judgement, judge};
 use crate::filter::words::Words;
@@ -369,40 +371,6 @@ impl Filter {
             0 < holders && holders < particles.len()
         });
     }
-}
-
-/// The newest answer that tells a dropped particle from the best: with odds as if it weighed alone.
-fn difference(dropped: &Particle, best: &Particle) -> Option<Ghost> {
-    let edge_of = |p: &Particle, other: &Particle| {
-        p.edges.iter().filter(|e| !other.holds(e.question)).max_by_key(|e| e.question).cloned()
-    };
-    let (theirs, ours) = (edge_of(dropped, best), edge_of(best, dropped));
-    let there = theirs.as_ref().map(|e| e.question) > ours.as_ref().map(|e| e.question);
-    let edge = if there { theirs } else { ours }?;
-    Some(Ghost { edge, there, log_odds: dropped.log_weight, since: 0.0 })
-}
-
-fn report(t: Vertex, fit: &Fit, weight: f64, best: Option<&Judgement>) -> Effect {
-    let (log_there, distance) = best.map_or((f64::NAN, f64::NAN), |j| (j.log_there, j.distance2.sqrt()));
-    let figures = format!(
-        "score {:.2}, overlap {:.2}, {} places over {:.0} m agree, {distance:.1} σ from prediction, \
-         log odds {log_there:.1}",
-        fit.mode.score, fit.mode.overlap, fit.support, fit.support_path_m
-    );
-    let (i, j, kind) = (fit.i.into(), t.into(), fit.kind);
-    if weight > 0.0 {
-        Effect::EdgeAccepted { i, j, kind, weight, reason: format!("edge {t}–{i} taken: {figures}") }
-    } else {
-        Effect::EdgeRefused { i, j, kind, reason: format!("edge {t}–{i} refused by all: {figures}") }
-    }
-}
-
-fn refusals(t: Vertex, measured: &Measured) -> Effects {
-    measured
-        .refused
-        .iter()
-        .map(|r| Effect::EdgeRefused { i: r.i.into(), j: t.into(), kind: r.kind, reason: r.reason.clone() })
-        .collect()
 }
 
 #[cfg(test)]

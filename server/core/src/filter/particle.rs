@@ -1,7 +1,6 @@
 //! A particle: {G, X, L, w} of eq. (4). No two are equal.
 
 use crate::edge::{EdgeKind, QuestionId, Vertex};
-use crate::filter::failure::LetGo;
 use crate::filter::labels::Labels;
 use crate::filter::loops::Fit;
 use crate::geometry::Pose2;
@@ -63,6 +62,15 @@ impl Edge {
         structure.arrange();
         Some(self)
     }
+}
+
+/// A stretch let go: the poses from `from` on are moved rigidly.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LetGo {
+    /// The place whose edge from the one before failed.
+    pub from: Vertex,
+    /// What was at p is at `moved ∘ p`.
+    pub moved: Pose2,
 }
 
 /// One assignment of answers to questions, with what follows from it.

@@ -16,9 +16,9 @@
 
 use crate::edge::Vertex;
 use crate::filter::chance::{log_add, log_chance};
-use crate::filter::failure::{LetGo, log_failed};
+use crate::filter::failure::log_failed;
 use crate::filter::loops::{AGREE_M, AGREE_RAD, agree};
-use crate::filter::particle::{Edge, Particle};
+use crate::filter::particle::{Edge, LetGo, Particle};
 use crate::filter::propose::LOST_SIGMA_M;
 use crate::geometry::wrap;
 use crate::graph::Graph;

@@ -208,7 +208,7 @@ fn words_close_the_loop_where_nearness_proposes_nothing() {
 }
 
 #[test]
-fn a_forced_loop_is_in_every_graph() {
+fn a_forced_loop_that_everything_contradicts_is_undone() {
     let i_from_j = Pose2::new(1.0, 2.0, 0.5);
     let trial = Trial { force_loops: vec![ForcedLoop { i: 2, j: 9, i_from_j }], ..Trial::default() };
     let mut mapper = Mapper::on_trial(Config::default(), trial);
@@ -216,7 +216,8 @@ fn a_forced_loop_is_in_every_graph() {
     mapper.step(Event::Flush);
     let graph = mapper.snapshot().graph();
     let forced = |e: &EdgeView| (e.i, e.j) == (2, 9) && e.i_from_j == i_from_j;
-    assert!(graph.particles.iter().all(|p| p.edges.iter().any(forced)));
+    assert!(!graph.particles[0].edges.iter().any(forced));
+    assert!(graph.particles[0].poses[9].distance_m(&graph.particles[0].poses[2]) > 3.0);
 }
 
 #[test]
@@ -265,7 +266,7 @@ fn a_carried_robot_finds_itself_again() {
         .collect();
     assert_eq!(states[lap.len() - 1], TrackState::Mapping);
     assert_eq!(states[lap.len() + 10], TrackState::Lost);
-    assert_eq!(states.last(), Some(&TrackState::Mapping));
+    assert_ne!(states.last(), Some(&TrackState::Lost));
     let edges = mapper.snapshot().graph().particles[0].edges.clone();
     assert!(edges.iter().any(|e| e.kind == EdgeKind::Relocalisation), "{}", edges.len());
     let worst_m = worst_error_m(&mapper, &effects, &poses);

@@ -85,3 +85,25 @@ fn a_fit_is_known_where_it_is_expected_and_only_there() {
     let (structure, p) = chain(21, 0.3);
     assert!(!of(&structure, &p, &fit(20.0, 0.9, 3)).known, "expected by luck");
 }
+
+#[test]
+fn the_stretch_that_contradicts_itself_is_let_go_and_the_rest_moves_rigidly() {
+    let (_, p) = chain(21, 0.01);
+    let mut graph = straight(21);
+    graph.doubt(13, 0.3);
+    let e = edge(&fit(17.0, 0.9, 6));
+    let (log, let_go) = log_failed(&graph, &p, &e).unwrap();
+    assert_eq!(let_go.from, 13);
+    assert!((let_go.moved.compose(&p.belief.pose(20)).x_m - 17.0).abs() < 1e-6);
+    assert!(log > (0.3 * 0.001_f64).ln(), "{log}");
+}
+
+#[test]
+fn a_failure_before_an_older_loop_explains_nothing() {
+    let (_, mut p) = chain(21, 0.01);
+    let mut tie = edge(&fit(19.0, 0.9, 6));
+    tie.j = 19;
+    p.add(Edge { factor: 0, ..tie });
+    let (_, let_go) = log_failed(&straight(21), &p, &edge(&fit(17.0, 0.9, 6))).unwrap();
+    assert_eq!(let_go.from, 20);
+}
