@@ -20,6 +20,7 @@ use crate::scan::agree::agreement;
 use crate::scan::view::Closeness;
 use crate::smoothing::{Relative, Structure};
 use crate::track::front::LOCAL_PATH_M;
+use libm::erf;
 
 /// p_D of a single pair within [`OVERLAP_M`] of each other, by the search.
 const FOUND: f64 = 0.8;
@@ -33,7 +34,7 @@ const EXPECTED_RAD: f64 = 0.1;
 /// So many standard deviations of the spread.
 const SIGMAS: f64 = 3.0;
 /// c₁ and c₀: how often places contradict each other that lie so, and that do not.
-const CONTRADICTED: (f64, f64) = (0.04, 0.6);
+const CONTRADICTS: (f64, f64) = (0.04, 0.6);
 /// Older places compared, so near in the map.
 const COMPARED_MAX: usize = 3;
 const COMPARED_M: f64 = 5.0;
@@ -109,7 +110,7 @@ fn log_contradicted(graph: &Graph, structure: &Structure, particle: &Particle, t
         let both = agreement(&graph.place(r.i).content, &graph.place(t).content, &r.i_from_a, &look);
         both.agree + both.conflict >= COMPARED_MIN && both.score() < SCORE_MIN
     };
-    if predicted.iter().any(contradicts) { (CONTRADICTED.0 / CONTRADICTED.1).ln() } else { 0.0 }
+    if predicted.iter().any(contradicts) { (CONTRADICTS.0 / CONTRADICTS.1).ln() } else { 0.0 }
 }
 
 /// The older places nearest to place `t` in a map, spread along the path.
@@ -143,15 +144,6 @@ fn is_expected(r: &Relative, z: &Pose2) -> bool {
     let off = r.i_from_a.between(z);
     off.x_m.hypot(off.y_m) < EXPECTED_M + SIGMAS * r.sigma_m()
         && off.yaw_rad.abs() < EXPECTED_RAD + SIGMAS * r.sigma_rad()
-}
-
-/// Abramowitz and Stegun 7.1.26, to 1.5e-7.
-fn erf(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
-    let poly = ((((1.061_405_429 * t - 1.453_152_027) * t + 1.421_413_741) * t - 0.284_496_736) * t
-        + 0.254_829_592)
-        * t;
-    (1.0 - poly * (-x * x).exp()).copysign(x)
 }
 
 #[cfg(test)]

@@ -138,22 +138,26 @@ pub fn born(
     }
     p.take(question);
     let Some(edge) = edge.filter(|_| child.adds) else { return Some(p) };
-    match with_edge(p.clone(), child, edge, structure) {
-        Some(tied) => p = tied,
-        None if child.is_new => return None,
-        None => return Some(p),
-    }
-    // What was said before counts for the floors that are one by now.
-    p.weigh_words(words);
-    Some(p)
+    let tied = with_edge(p.clone(), edge, child.lets_go, structure, words);
+    if tied.is_none() && !child.is_new { Some(p) } else { tied }
 }
 
-fn with_edge(mut p: Particle, child: &Child, edge: &Edge, structure: &Structure) -> Option<Particle> {
-    let before = p.belief.chi2(structure);
+/// A particle that takes an edge into its graph, and for it lets a stretch go. None where the edge does not go
+/// with the poses.
+pub fn with_edge(
+    mut p: Particle,
+    edge: &Edge,
+    lets_go: Option<LetGo>,
+    structure: &Structure,
+    words: &dyn Words,
+) -> Option<Particle> {
+    let before = p.belief.least_chi2(structure);
     p.add(edge.clone());
-    if let Some(let_go) = child.lets_go {
+    if let Some(let_go) = lets_go {
         p.let_go(structure, &let_go).ok()?;
     }
     p.update(structure).ok()?;
-    (p.belief.chi2(structure) < before + CHI2_RISE_MAX).then_some(p)
+    // What was said before counts for the floors that are one by now.
+    p.weigh_words(words);
+    (p.belief.least_chi2(structure) < before + CHI2_RISE_MAX).then_some(p)
 }

@@ -6,7 +6,7 @@
 //! against a fit, and true copies put a bound on what looks alone can say:
 //!
 //! ```text
-//! λ_c(z) = (ν + 1/r) / V · Σ_m π_m N(θ_z; θ⁻ + mπ/2, σ_θ²)      fits by chance and copies, per m² and rad
+//! λ_c(z) = (ν + 1/r) / V · (Σ_m π_m N(θ_z; θ⁻ + mπ/2, σ_θ²) + π/2π)   fits by chance and copies, per m², rad
 //! r      = f₁ / f_c: logistic, of how many agree, over how long, how well
 //! ```
 //!
@@ -24,8 +24,9 @@ pub const LOOKS: [f64; 4] = [1.92, -1.88, 1.17, -1.74];
 const SEARCHED_M2: f64 = 400.0;
 /// ν: copies of a stretch, as far as scans can tell, in such an area …
 const COPIES: f64 = 2.0;
-/// … and π_m: their headings, by quarter turns.
-const TURNED: [f64; 4] = [0.7, 0.1, 0.1, 0.1];
+/// … and π_m: their headings, by quarter turns, and any.
+const TURNED: [f64; 4] = [0.65, 0.1, 0.1, 0.1];
+const ASKEW: f64 = 0.05;
 /// Shares of contradicted points by which they are scaled, and below which they are not known to be.
 const CONTRADICTED: f64 = 0.1;
 const CONTRADICTED_MIN: f64 = 0.005;
@@ -44,7 +45,7 @@ pub fn log_looks(fit: &Fit, fits: usize) -> f64 {
     -(COPIES + (-log_ratio).exp()).ln()
 }
 
-/// log Σ_m π_m N(θ_z; θ⁻ + mπ/2, σ_θ²) / V, in m⁻² rad⁻¹, of a fit turned by `off_rad` from the prediction,
+/// log (Σ_m π_m N(θ_z; θ⁻ + mπ/2, σ_θ²) + π/2π) / V, in m⁻² rad⁻¹, of a fit turned by `off_rad` from the prediction,
 /// whose spread is σ_θ.
 pub fn log_chance(off_rad: f64, sigma_rad: f64) -> f64 {
     let sigma_rad = sigma_rad.max(1e-6);
@@ -52,7 +53,7 @@ pub fn log_chance(off_rad: f64, sigma_rad: f64) -> f64 {
         let off = wrap(off_rad - turns as f64 * FRAC_PI_2) / sigma_rad;
         share.ln() - 0.5 * (off * off + TAU.ln()) - sigma_rad.ln()
     };
-    TURNED.iter().enumerate().map(of).fold(f64::NEG_INFINITY, log_add) - SEARCHED_M2.ln()
+    TURNED.iter().enumerate().map(of).fold((ASKEW / TAU).ln(), log_add) - SEARCHED_M2.ln()
 }
 
 /// ln (eᵃ + eᵇ).
@@ -95,7 +96,8 @@ mod tests {
         let ratio = |off: f64, sigma: f64| {
             -0.5 * ((off / sigma).powi(2) + TAU.ln()) - sigma.ln() - log_chance(off, sigma)
         };
-        assert!((ratio(0.0, 0.01) - ratio(0.0, 0.2)).abs() < 1e-6);
+        assert!((ratio(0.0, 0.01) - ratio(0.0, 0.2)).abs() < 0.01);
+        assert!(log_chance(0.8, 0.001) > log_chance(0.0, 3.0) - 4.0, "fits lie at any angle, too");
         assert!(ratio(FRAC_PI_2, 0.1) < -50.0, "a quarter turn is a copy's");
         let askew = log_chance(0.8, 3.0);
         assert!((askew - log_chance(0.0, 3.0)).abs() < 0.1, "of a heading unknown nothing is");

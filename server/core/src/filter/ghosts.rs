@@ -33,12 +33,16 @@ pub struct Ghost {
     pub log_odds: f64,
     /// How much of that the kept graphs gained or lost since, see [`Ghosts::kept_gained`].
     pub since: f64,
+    /// log p(λ | G) of the best graph when it was dropped.
+    pub log_words: f64,
 }
 
 impl Ghost {
-    /// u_q.
-    pub fn share(&self) -> f64 {
-        1.0 / (1.0 + (-self.log_odds).exp())
+    /// u_q, with log p(λ | G) of the best graph as it is by now: what that did not expect to be said speaks for
+    /// what was dropped.
+    pub fn share(&self, log_words: f64) -> f64 {
+        let log_odds = self.log_odds + (self.log_words - log_words).max(0.0);
+        1.0 / (1.0 + (-log_odds).exp())
     }
 }
 
@@ -78,8 +82,8 @@ impl Ghosts {
     }
 
     /// Takes out the likeliest answer that is to come back.
-    pub fn next_reopened(&mut self) -> Option<Ghost> {
-        let at = self.ghosts.iter().position(|g| g.share() > REOPENED)?;
+    pub fn next_reopened(&mut self, log_words: f64) -> Option<Ghost> {
+        let at = self.ghosts.iter().position(|g| g.share(log_words) > REOPENED)?;
         Some(self.ghosts.remove(at))
     }
 
@@ -89,13 +93,13 @@ impl Ghosts {
     }
 
     /// Forgets what became impossible.
-    pub fn forget(&mut self) {
-        self.ghosts.retain(|g| g.share() > FORGOTTEN);
+    pub fn forget(&mut self, log_words: f64) {
+        self.ghosts.retain(|g| g.share(log_words) > FORGOTTEN);
     }
 
     /// Posterior mass of all that was dropped.
-    pub fn unresolved(&self) -> f64 {
-        1.0 - self.ghosts.iter().map(|g| 1.0 - g.share()).product::<f64>()
+    pub fn unresolved(&self, log_words: f64) -> f64 {
+        1.0 - self.ghosts.iter().map(|g| 1.0 - g.share(log_words)).product::<f64>()
     }
 }
 
@@ -107,7 +111,7 @@ pub fn difference(dropped: &Particle, best: &Particle) -> Option<Ghost> {
     let (theirs, ours) = (edge_of(dropped, best), edge_of(best, dropped));
     let there = theirs.as_ref().map(|e| e.question) > ours.as_ref().map(|e| e.question);
     let edge = if there { theirs } else { ours }?;
-    Some(Ghost { edge, there, log_odds: dropped.log_weight, since: 0.0 })
+    Some(Ghost { edge, there, log_odds: dropped.log_weight, since: 0.0, log_words: best.log_words })
 }
 
 #[cfg(test)]
@@ -117,7 +121,7 @@ mod tests {
 
     fn ghost(n: u32, there: bool, share: f64) -> Ghost {
         let edge = Edge { question: QuestionId { boot: 0, n }, ..edge(&fit(1.0, 0.9, 3)) };
-        Ghost { edge, there, log_odds: (share / (1.0 - share)).ln(), since: 0.0 }
+        Ghost { edge, there, log_odds: (share / (1.0 - share)).ln(), since: 0.0, log_words: 0.0 }
     }
 
     #[test]
@@ -125,21 +129,30 @@ mod tests {
         let mut ghosts = Ghosts::default();
         ghosts.drop_answer(ghost(0, false, 0.001));
         ghosts.drop_answer(ghost(1, true, 0.002));
-        assert!((ghosts.unresolved() - (1.0 - 0.999 * 0.998)).abs() < 1e-12);
+        assert!((ghosts.unresolved(0.0) - (1.0 - 0.999 * 0.998)).abs() < 1e-12);
         ghosts.gain(QuestionId { boot: 0, n: 0 }, 20.0);
-        ghosts.forget();
-        assert!((ghosts.unresolved() - 0.002).abs() < 1e-9);
+        ghosts.forget(0.0);
+        assert!((ghosts.unresolved(0.0) - 0.002).abs() < 1e-9);
     }
 
     #[test]
     fn what_becomes_likely_comes_back() {
         let mut ghosts = Ghosts::default();
         ghosts.drop_answer(ghost(0, false, 0.001));
-        assert_eq!(ghosts.next_reopened(), None);
+        assert_eq!(ghosts.next_reopened(0.0), None);
         // The kept graphs expected a fit in vain, twice.
         ghosts.kept_gained(-3.2);
-        assert_eq!(ghosts.next_reopened().map(|g| g.edge.question.n), Some(0));
-        assert!(ghosts.unresolved() < 1e-12);
+        assert_eq!(ghosts.next_reopened(0.0).map(|g| g.edge.question.n), Some(0));
+        assert!(ghosts.unresolved(0.0) < 1e-12);
+    }
+
+    #[test]
+    fn what_the_kept_did_not_expect_to_hear_speaks_for_the_dropped_until_it_is_taken_back() {
+        let mut ghosts = Ghosts::default();
+        ghosts.drop_answer(ghost(0, false, 0.001));
+        let before = ghosts.unresolved(0.0);
+        assert!(ghosts.unresolved(-2.0) > 7.0 * before);
+        assert!((ghosts.unresolved(3.0) - before).abs() < 1e-12, "names elsewhere say nothing against it");
     }
 
     #[test]

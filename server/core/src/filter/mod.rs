@@ -129,7 +129,7 @@ impl Filter {
     /// Posterior mass of the graphs that were dropped. The weights of the particles sum to one among
     /// themselves.
     pub fn unresolved(&self) -> f64 {
-        self.ghosts.unresolved()
+        self.ghosts.unresolved(self.best().log_words)
     }
 
     /// The best particle.
@@ -178,7 +178,8 @@ impl Filter {
         let judged = judge(&self.graph, &self.structure, self.best(), &edge);
         let Some(edge) = edge.enter(Arc::make_mut(&mut self.structure)) else { return };
         let log_odds = -judged.map_or(0.0, |j| j.log_there);
-        self.ghosts.drop_answer(Ghost { edge: edge.clone(), there: false, log_odds, since: 0.0 });
+        let log_words = self.best().log_words;
+        self.ghosts.drop_answer(Ghost { edge: edge.clone(), there: false, log_odds, since: 0.0, log_words });
         self.particles.iter_mut().for_each(|p| p.add(edge.clone()));
         self.update();
     }
@@ -280,8 +281,9 @@ impl Filter {
         let worth = all.partition_point(|c| c.log_weight >= log_sum + KEPT_MIN.ln());
         let dropped = all.split_off(worth.min(self.config.particles.max(1) as usize).max(1));
         let log_kept = all.iter().map(|c| c.log_weight).fold(f64::NEG_INFINITY, log_add);
+        let best = all[0];
         for child in &dropped {
-            self.drop_child(edge, child, log_kept);
+            self.drop_child(edge, child, &best, log_kept);
         }
         let adds = |c: &Child| c.there && c.adds && (wanted || c.is_new);
         let entered =
@@ -295,7 +297,7 @@ impl Filter {
         };
         let born: Vec<Option<Particle>> = all.par_iter().map(birth).collect();
         for child in all.iter().zip(&born).filter_map(|(c, born)| born.is_none().then_some(c)) {
-            self.drop_child(edge, child, log_kept);
+            self.drop_child(edge, child, &best, log_kept);
         }
         let particles: Vec<Particle> = born.into_iter().flatten().collect();
         if !particles.is_empty() {
@@ -307,12 +309,15 @@ impl Filter {
         self.particles.iter().filter(there).map(Particle::weight).sum()
     }
 
-    fn drop_child(&mut self, edge: &Edge, child: &Child, log_kept: f64) {
+    /// A child is dropped for its answer, or where the best gives the same, for what its parent had said before.
+    fn drop_child(&mut self, edge: &Edge, child: &Child, best: &Child, log_kept: f64) {
         let log_odds = child.log_weight - log_kept;
-        let ghost = if child.is_new {
-            Some(Ghost { edge: edge.clone(), there: child.there, log_odds, since: 0.0 })
+        let ghost = if child.is_new && child.there != best.there {
+            let log_words = self.particles[best.parent].log_words;
+            Some(Ghost { edge: edge.clone(), there: child.there, log_odds, since: 0.0, log_words })
         } else {
-            difference(&self.particles[child.parent], self.best()).map(|g| Ghost { log_odds, ..g })
+            difference(&self.particles[child.parent], &self.particles[best.parent])
+                .map(|g| Ghost { log_odds, ..g })
         };
         if let Some(ghost) = ghost {
             self.ghosts.drop_answer(ghost);
@@ -357,7 +362,7 @@ impl Filter {
         for ghost in dropped.iter().filter_map(|p| difference(p, best)) {
             self.ghosts.drop_answer(Ghost { log_odds: ghost.log_odds - kept.ln(), ..ghost });
         }
-        self.ghosts.forget();
+        self.ghosts.forget(self.particles[0].log_words);
     }
 
     /// Takes out the factors that no particle holds any more.

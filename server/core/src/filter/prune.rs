@@ -43,12 +43,21 @@ pub fn merge(structure: &Structure, mut particles: Vec<Particle>) -> Vec<Particl
 
 /// Whether two give the same answers, or differ in answers that their maps give alike.
 fn say_same(structure: &Structure, a: &Particle, b: &Particle) -> bool {
-    a.taken == b.taken || {
-        let one_sided = |x: &Particle, y: &Particle| -> Vec<QuestionId> {
-            x.taken.iter().copied().filter(|&q| !y.holds(q)).collect()
-        };
-        is_laid_alike(structure, a, b, &one_sided(a, b)) && is_laid_alike(structure, b, a, &one_sided(b, a))
-    }
+    let one_sided = |x: &Particle, y: &Particle| -> Vec<QuestionId> {
+        x.taken.iter().copied().filter(|&q| !y.holds(q)).collect()
+    };
+    fail_alike(a, b)
+        && (a.taken == b.taken
+            || is_laid_alike(structure, a, b, &one_sided(a, b))
+                && is_laid_alike(structure, b, a, &one_sided(b, a)))
+}
+
+/// Whether two let the same stretches go, or others that bend their maps alike.
+fn fail_alike(a: &Particle, b: &Particle) -> bool {
+    let one_sided = a.failed.iter().filter(|v| !b.failed.contains(v));
+    let mut bent = one_sided.chain(b.failed.iter().filter(|v| !a.failed.contains(v)));
+    let step = |p: &Particle, v: u32| p.belief.pose(v - 1).between(&p.belief.pose(v));
+    bent.all(|&v| same(&step(a, v), &step(b, v)))
 }
 
 /// Whether `other` lays the places of a particle's answers as the particle does, and as surely.

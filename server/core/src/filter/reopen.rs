@@ -3,6 +3,7 @@
 
 use crate::effects::{Effect, Effects};
 use crate::filter::Filter;
+use crate::filter::answer::with_edge;
 use crate::filter::ghosts::Ghost;
 use crate::filter::particle::Particle;
 use crate::filter::weigh::judge;
@@ -18,7 +19,7 @@ impl Filter {
         self.tell_anew();
         let mut effects = Effects::new();
         for _ in 0..REOPENED_MAX {
-            let Some(ghost) = self.ghosts.next_reopened() else { break };
+            let Some(ghost) = self.ghosts.next_reopened(self.particles[0].log_words) else { break };
             let (i, j, kind) = (ghost.edge.i, ghost.edge.j, ghost.edge.kind);
             let Some(child) = self.come_back(&ghost, words) else { continue };
             let what = if ghost.there { "may be there after all" } else { "may not be there after all" };
@@ -44,31 +45,37 @@ impl Filter {
 
     /// The best particle with the other answer. None if no graph comes of it, or the same.
     fn come_back(&mut self, ghost: &Ghost, words: &dyn Words) -> Option<Particle> {
-        let question = ghost.edge.question;
-        let mut p = self.best().clone();
-        if p.holds(question) == ghost.there {
+        if self.best().holds(ghost.edge.question) == ghost.there {
             return None;
         }
-        if ghost.there {
-            let judged = judge(&self.graph, &self.structure, &p, &ghost.edge)?;
-            let edge = ghost.edge.clone().enter(Arc::make_mut(&mut self.structure))?;
-            self.disputed.push(edge.factor);
-            self.update();
-            p = self.best().clone();
-            p.refused.retain(|&q| q != question);
-            p.add(edge);
-            p.update(&self.structure).ok()?;
-            p.log_weight += judged.log_there;
-        } else {
-            self.disputed.extend(p.edges.iter().filter(|e| e.question == question).map(|e| e.factor));
-            p.give_up(question);
-            p.update(&self.structure).ok()?;
-            let judged = judge(&self.graph, &self.structure, &p, &ghost.edge)?;
-            if judged.known {
-                return None;
-            }
-            p.log_weight += ghost.since - judged.log_there;
+        if ghost.there { self.take_after_all(ghost, words) } else { self.give_up(ghost, words) }
+    }
+
+    fn take_after_all(&mut self, ghost: &Ghost, words: &dyn Words) -> Option<Particle> {
+        let judged = judge(&self.graph, &self.structure, self.best(), &ghost.edge)?;
+        let edge = ghost.edge.clone().enter(Arc::make_mut(&mut self.structure))?;
+        self.disputed.push(edge.factor);
+        if let Some(let_go) = judged.lets_go {
+            self.loosen(let_go.from);
         }
+        self.update();
+        let mut p = self.best().clone();
+        p.refused.retain(|&q| q != edge.question);
+        p.log_weight += judged.log_there;
+        with_edge(p, &edge, judged.lets_go, &self.structure, words)
+    }
+
+    fn give_up(&mut self, ghost: &Ghost, words: &dyn Words) -> Option<Particle> {
+        let question = ghost.edge.question;
+        let mut p = self.best().clone();
+        self.disputed.extend(p.edges.iter().filter(|e| e.question == question).map(|e| e.factor));
+        p.give_up(question);
+        p.update(&self.structure).ok()?;
+        let judged = judge(&self.graph, &self.structure, &p, &ghost.edge)?;
+        if judged.known {
+            return None;
+        }
+        p.log_weight += ghost.since - judged.log_there;
         p.weigh_words(words);
         Some(p)
     }

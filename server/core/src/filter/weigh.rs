@@ -22,7 +22,7 @@ use crate::filter::particle::{Edge, LetGo, Particle};
 use crate::filter::propose::LOST_SIGMA_M;
 use crate::geometry::wrap;
 use crate::graph::Graph;
-use crate::smoothing::{Relative, Structure};
+use crate::smoothing::{LogDensity, Relative, Structure};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::{PI, TAU};
 
@@ -32,9 +32,9 @@ pub(crate) const DETECTED: f64 = 0.8;
 const TAIL: f64 = 0.02;
 /// Of robots whose odometry broke so many are where they were, within so much; so many on floor that was
 /// driven, each place of it standing for so much.
-const STAYED: f64 = 0.5;
-const STAYED_SIGMA: [f64; 3] = [0.5, 0.5, 0.5];
-const SOMEWHERE: f64 = 0.4;
+const STAYED: f64 = 0.3;
+const STAYED_SIGMA: [f64; 3] = [1.0, 1.0, 1.0];
+const SOMEWHERE: f64 = 0.6;
 const PLACE_M2: f64 = 2.0;
 
 /// A fit that a chain explains worse than chance by so much may be one across a stretch that failed.
@@ -97,13 +97,10 @@ fn turned_rad(predicted: &Relative, edge: &Edge) -> f64 {
 
 /// log N(z; h, S), with the tail of N, and z's Mahalanobis distance² from the prediction.
 pub fn log_density(predicted: &Relative, edge: &Edge) -> Option<(f64, f64)> {
-    let s = predicted.covariance + edge.covariance;
-    let off = predicted.i_from_a.between(&edge.i_from_j).log();
-    let distance2 = (off.transpose() * s.try_inverse()? * off).x;
-    let norm = 0.5 * (s * TAU).determinant().ln();
-    let core = (1.0 - TAIL).ln() - 0.5 * distance2;
-    let tail = TAIL.ln() - 3.0 * 3.0_f64.ln() - 0.5 * distance2 / 9.0;
-    Some((log_add(core, tail) - norm, distance2))
+    let LogDensity { log_density, distance2 } = predicted.log_density(&edge.i_from_j, &edge.covariance)?;
+    // N(9S), by N(S).
+    let wide = log_density + 0.5 * (distance2 - distance2 / 9.0) - 3.0 * 3.0_f64.ln();
+    Some((log_add((1.0 - TAIL).ln() + log_density, TAIL.ln() + wide), distance2))
 }
 
 /// log density of a fit after a break of odometry, m⁻² rad⁻¹, in a map of so many places.

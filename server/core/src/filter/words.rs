@@ -24,11 +24,8 @@ impl Filter {
     /// Puts each particle's share of the words in its weight as it is now, in place of what it was when last
     /// asked: w ∝ p(λ | G) however often, and in whatever order, it is asked.
     pub fn weigh_words(&mut self, words: &dyn Words) {
-        let before = self.best().log_words;
         self.particles.par_iter_mut().for_each(|p| p.weigh_words(words));
         self.rank();
-        // A sentence that the kept graphs did not expect speaks for what was dropped.
-        self.ghosts.kept_gained((self.best().log_words - before).min(0.0));
     }
 }
 

@@ -1,5 +1,6 @@
 //! A Gaussian over a pose in the map's axes, position and heading apart, and how much of it is near.
 
+use libm::erf;
 use nalgebra::Matrix3;
 use std::f64::consts::{PI, SQRT_2};
 
@@ -86,14 +87,6 @@ fn sigma(variance: f64) -> f64 {
 fn between(a: f64, b: f64, mean: f64, sigma: f64) -> f64 {
     let at = |x: f64| erf((x - mean) / (sigma * SQRT_2));
     0.5 * (at(b) - at(a))
-}
-
-/// The error function to 1.5e-7 (Abramowitz and Stegun 7.1.26).
-fn erf(x: f64) -> f64 {
-    let t = 1.0 / (1.0 + 0.327_591_1 * x.abs());
-    let of_t =
-        0.254_829_592 + t * (-0.284_496_736 + t * (1.421_413_741 + t * (-1.453_152_027 + t * 1.061_405_429)));
-    (1.0 - t * of_t * (-x * x).exp()).copysign(x)
 }
 
 #[cfg(test)]

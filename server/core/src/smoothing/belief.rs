@@ -3,12 +3,12 @@
 
 use crate::geometry::Pose2;
 use crate::smoothing::chunked::Chunked;
-use crate::smoothing::evidence::Sums;
 use crate::smoothing::factor::{At, residual};
 use crate::smoothing::frames::Frames;
 use crate::smoothing::front::Front;
 use crate::smoothing::marginal::Prior;
 use crate::smoothing::structure::{Holders, Structure};
+use crate::smoothing::sums::Sums;
 use crate::smoothing::tree::{Clique, Entry, NONE, Places, Share};
 use crate::smoothing::{Factor, FactorId, SmoothError};
 use serde::{Deserialize, Serialize};

@@ -18,6 +18,7 @@ use crate::smoothing::structure::Structure;
 use crate::smoothing::tree::Clique;
 use crate::smoothing::{Belief, SmoothError};
 use nalgebra::{Dyn, Matrix3, MatrixView, MatrixXx3, U1, U3};
+use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::rc::Rc;
 
@@ -72,6 +73,26 @@ impl Relative {
     pub fn sigma_rad(&self) -> f64 {
         self.covariance[(2, 2)].sqrt()
     }
+
+    /// Density of a measured pose z of a in the frame of the candidate (metres, radians), of the covariance R
+    /// of z's right perturbation: `S = Σ_h + R` with h the pose predicted. What the edge adds to the evidence.
+    /// None where S is no covariance.
+    pub fn log_density(&self, z: &Pose2, covariance: &Matrix3<f64>) -> Option<LogDensity> {
+        let s = (self.covariance + covariance).cholesky()?;
+        let v = self.i_from_a.between(z).log();
+        let distance2 = v.dot(&s.solve(&v));
+        let log_density = -0.5 * distance2 - s.l().diagonal().product().ln() - 1.5 * TAU.ln();
+        log_density.is_finite().then_some(LogDensity { log_density, distance2 })
+    }
+}
+
+/// The density of a measurement that a belief does not hold, as it sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LogDensity {
+    /// `log N(log(h⁻¹z); 0, S)`, nats; units are metres and radians.
+    pub log_density: f64,
+    /// `νᵀ S⁻¹ ν`, ν = log(h⁻¹z): of three degrees of freedom.
+    pub distance2: f64,
 }
 
 /// Y of one pose: by clique from the pose's own to the root, the frontals' rows.

@@ -13,11 +13,11 @@
 // Inlined, a loop runs in the registers of who calls it; called, in those that every processor has.
 #![allow(clippy::inline_always)]
 
-use crate::smoothing::evidence::Sums;
 use crate::smoothing::kernels::{
     Ill, back, block_of, columns_of, dots, eliminate_panel, offset, rows_of, solve_lower, subtract_products,
     wide,
 };
+use crate::smoothing::sums::Sums;
 use faer::{Mat, MatRef};
 use nalgebra::{Matrix3, Vector3};
 use std::f64::consts::TAU;

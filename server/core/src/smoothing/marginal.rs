@@ -6,10 +6,10 @@
 //! between-factor. r is one that v held well: from one hardly known relative to the others, or not at
 //! all where a particle lacks the factor, the others would seem to bend when they turn together.
 
-use crate::smoothing::evidence::Sums;
 use crate::smoothing::factor::{At, Linearised, Residual, residual};
 use crate::smoothing::front::Front;
 use crate::smoothing::structure::{Marginalised, Structure};
+use crate::smoothing::sums::Sums;
 use crate::smoothing::tree::{Entry, NONE};
 use crate::smoothing::{Belief, SmoothError};
 use nalgebra::{DMatrix, DVector};

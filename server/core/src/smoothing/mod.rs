@@ -50,14 +50,14 @@ mod order;
 mod qr;
 mod smoother;
 mod structure;
+mod sums;
 #[cfg(test)]
 mod tests;
 mod tree;
 mod update;
 
 pub use belief::Belief;
-pub use covariance::{Joint, JointPart, JointRoom, Relative};
-pub use evidence::LogDensity;
+pub use covariance::{Joint, JointPart, JointRoom, LogDensity, Relative};
 pub use factor::Factor;
 pub use smoother::Smoother;
 pub use structure::Structure;

@@ -1,8 +1,8 @@
 //! What all particles share: poses, factors, and the tree's shape.
 
 use crate::geometry::Pose2;
-use crate::smoothing::evidence::half_log_det;
 use crate::smoothing::factor::{At, checked_information};
+use crate::smoothing::sums::half_log_det;
 use crate::smoothing::tree::{Entry, Tree};
 use crate::smoothing::{Factor, FactorId, SmoothError};
 use nalgebra::Matrix3;

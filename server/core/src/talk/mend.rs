@@ -19,7 +19,7 @@ pub(crate) fn mend(talk: &mut Talk, filter: &mut Filter, command: &Command) -> R
 }
 
 /// Takes back a sentence, the newest that stands if none is named: labels and weights are as if it
-/// had never been said. Edges that it led to are judged again.
+/// had never been said.
 pub(crate) fn undo(talk: &mut Talk, filter: &mut Filter, id: Option<&str>) -> Result<String, String> {
     let Some(number) = talk.ledger.standing(id) else {
         return Err(match id {
@@ -28,25 +28,18 @@ pub(crate) fn undo(talk: &mut Talk, filter: &mut Filter, id: Option<&str>) -> Re
             None => "there is no sentence left to take back".to_owned(),
         });
     };
-    let given_up = strike(talk, filter, number);
-    let text = &talk.ledger.entries()[number as usize].text;
-    let loops = match given_up {
-        0 => String::new(),
-        1 => " A loop that it had led to is given up.".to_owned(),
-        n => format!(" {n} loops that it had led to are given up."),
-    };
-    Ok(format!("I took back: \"{text}\".{loops}"))
+    strike(talk, filter, number);
+    Ok(format!("I took back: \"{}\".", talk.ledger.entries()[number as usize].text))
 }
 
-/// The same by the sentence's number in the ledger. Returns how many loops were given up with it.
-pub(crate) fn strike(talk: &mut Talk, filter: &mut Filter, number: u32) -> usize {
+/// The same by the sentence's number in the ledger.
+pub(crate) fn strike(talk: &mut Talk, filter: &mut Filter, number: u32) {
     Arc::make_mut(&mut talk.ledger).strike(number);
     for p in &mut filter.particles {
         p.labels.revoke(number);
     }
     resolve(talk, filter);
     filter.weigh_words(talk);
-    0
 }
 
 fn rename(talk: &mut Talk, filter: &mut Filter, from: &str, to: &str) -> Result<String, String> {

@@ -306,33 +306,3 @@ proptest! {
         prop_assert!(gain > FALSE_TALK.ln() - 1.0 - 0.05 * said.len() as f64 && gain < 5.5, "{gain}");
     }
 }
-
-/// Sentences on a tour of so many metres, each name now and then; the time one fold of them takes.
-fn fold_s(sentences: u32, spread_m: f64) -> f64 {
-    let x_m: Vec<f64> = (0..sentences).map(|k| f64::from(k * 7919 % sentences) * spread_m).collect();
-    let map = map(&x_m);
-    let mut talk = Talk::default();
-    (0..60).for_each(|k| {
-        talk.name(k);
-    });
-    for k in 0..sentences {
-        talk.claim(&map, &[called(k, k * 31 % 60)]);
-    }
-    let started = cpu_time::ThreadTime::now();
-    for _ in 0..5 {
-        assert!(log_likelihood(&talk, &map).is_finite());
-    }
-    started.elapsed().as_secs_f64() / 5.0
-}
-
-#[test]
-#[ignore = "tells the time: run it alone, in release"]
-fn a_fold_is_quick() {
-    for (sentences, most_s) in [(200, 1e-3), (2000, 30e-3)] {
-        for spread_m in [1e-3, 1.0, 10.0] {
-            let s = fold_s(sentences, spread_m);
-            println!("{sentences} sentences, one each {spread_m} m: {:.3} ms", s * 1e3);
-            assert!(s < most_s);
-        }
-    }
-}
