@@ -204,9 +204,7 @@ pub struct Place {
 /// A distinct graph of the posterior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Particle {
-    /// Particles that hold it.
-    pub count: u32,
-    /// Their weight together.
+    /// Its posterior mass; all sum to one with what is unresolved.
     pub weight: f64,
     /// Its loop edges; the chain of successive places is implied.
     pub edges: Vec<Edge>,

@@ -169,11 +169,10 @@ pub fn graph_reply(graph: GraphAnswer, map: MapIdentity) -> GraphReply {
         yaw_rad: p.pose.yaw_rad,
         labels: p.labels.into_iter().collect(),
     });
-    let particles = graph.particles.into_iter().map(|p| Particle {
-        count: p.count,
-        weight: p.weight,
-        edges: p.edges.iter().map(edge).collect(),
-    });
+    let particles = graph
+        .particles
+        .into_iter()
+        .map(|p| Particle { weight: p.weight, edges: p.edges.iter().map(edge).collect() });
     GraphReply {
         v: ANSWER_VERSION,
         query: "graph".into(),

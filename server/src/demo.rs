@@ -219,7 +219,6 @@ fn graph(reply: GraphReply) -> GraphAnswer {
         i_from_j: Pose2::new(e.dx_m, e.dy_m, e.dyaw_rad),
     };
     let particles = reply.particles.into_iter().map(|p| ParticleView {
-        count: p.count,
         weight: p.weight,
         edges: p.edges.into_iter().map(edge).collect(),
         poses: Vec::new(),
@@ -295,7 +294,7 @@ mod tests {
             "v": 1, "query": "graph", "map": MapIdentity::default(), "effective_sample_size": 2.0,
             "places": [{"id": 4, "stamp": {"sec": 1, "nanosec": 0}, "x_m": 1.0, "y_m": 2.0, "yaw_rad": 0.5,
                         "labels": {"gym": 0.9}}],
-            "particles": [{"count": 2, "weight": 1.0, "edges": [
+            "particles": [{"weight": 1.0, "edges": [
                 {"i": 0, "j": 4, "kind": "semantic", "dx_m": 1.0, "dy_m": 0.0, "dyaw_rad": 0.0}]}]
         }))
         .unwrap();

@@ -14,7 +14,8 @@ use toponym_core::event::{Laser, Odom, Scan, Setup};
 use toponym_core::scan::correlate::Source;
 use toponym_core::scan::matching::{index, modes, refine};
 use toponym_core::scan::sweep::{Sweep, sweep};
-use toponym_core::track::front::{FrontEnd, FrozenPlace};
+use toponym_core::track::front::FrontEnd;
+use toponym_core::track::places::FrozenPlace;
 use toponym_core::{Config, Event, Mapper, Pose2};
 
 /// The corridor's centre line is a rectangle of this size …

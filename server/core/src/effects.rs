@@ -134,11 +134,11 @@ pub enum Effect {
         /// The older places that were proposed, each with the largest probability that a particle gives
         /// it; of many the likeliest are matched, and the others wait.
         proposed: Vec<Proposal>,
-        /// Copies and weight of each distinct graph, best first; with `unresolved` they sum to one.
-        weights: Vec<(u32, f64)>,
+        /// Weight of each distinct graph, best first; with `unresolved` they sum to one.
+        weights: Vec<f64>,
         /// Posterior mass of graphs that were dropped.
         unresolved: f64,
-        /// Effective sample size among those kept, before any resampling.
+        /// Effective sample size among those kept.
         effective_sample_size: f64,
     },
     /// How well the robot knows where it is has changed. Comes with the first scan, too.

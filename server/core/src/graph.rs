@@ -6,7 +6,7 @@ use crate::event::StampNs;
 use crate::geometry::Pose2;
 use crate::scan::matching::Mode;
 use crate::scan::place::Content;
-use crate::track::front::{Chain, FrozenPlace};
+use crate::track::places::{Chain, FrozenPlace};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::ops::Range;

@@ -17,7 +17,7 @@ use crate::mapper::standing::Standing;
 use crate::smoothing::SmoothError;
 use crate::talk::{Here, Talk};
 use crate::track::Track;
-use crate::track::front::{FrozenPlace, OpenPlace};
+use crate::track::places::{FrozenPlace, OpenPlace};
 use crate::trial::Trial;
 use crate::{Answer, Config, Event, Query};
 use nalgebra::Matrix3;

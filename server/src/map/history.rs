@@ -27,7 +27,7 @@ struct Line<'a> {
     proposed: &'a [Proposal],
     edges: Vec<Edge>,
     effective_sample_size: f64,
-    weights: &'a [(u32, f64)],
+    weights: &'a [f64],
     unresolved: f64,
 }
 

@@ -271,7 +271,7 @@ mod tests {
             epoch: 0,
             rev: 0,
             places: vec![place(0, 1.0, 1.0, &[("gym", 0.9)]), place(1, 9.0, 1.0, &[])],
-            particles: vec![ParticleView { count: 1, weight: 1.0, edges: vec![edge], poses: vec![] }],
+            particles: vec![ParticleView { weight: 1.0, edges: vec![edge], poses: vec![] }],
             unresolved: 0.0,
             differences: vec![],
             effective_sample_size: 1.0,

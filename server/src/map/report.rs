@@ -57,9 +57,7 @@ pub struct Place {
 /// A distinct graph.
 #[derive(Debug, Serialize)]
 pub struct Particle {
-    /// Particles that hold it.
-    pub count: u32,
-    /// Their weight together.
+    /// Its posterior mass.
     pub weight: f64,
     /// Its loop edges.
     pub edges: Vec<Edge>,
@@ -233,7 +231,7 @@ fn particle(p: &toponym_core::answers::query::ParticleView) -> Particle {
         dyaw_rad: e.i_from_j.yaw_rad,
     });
     let poses = p.poses.iter().map(|p| [p.x_m, p.y_m, p.yaw_rad]);
-    Particle { count: p.count, weight: p.weight, edges: edges.collect(), poses: poses.collect() }
+    Particle { weight: p.weight, edges: edges.collect(), poses: poses.collect() }
 }
 
 fn answer(a: WhereAnswer, robot: &str) -> Answer {

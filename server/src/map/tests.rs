@@ -178,7 +178,7 @@ fn the_history_has_a_line_per_place_with_what_was_looked_at_and_why() {
     assert_eq!(told, places);
     for line in &lines {
         let weights = line["weights"].as_array().unwrap();
-        let kept: f64 = weights.iter().map(|w| w[1].as_f64().unwrap()).sum();
+        let kept: f64 = weights.iter().map(|w| w.as_f64().unwrap()).sum();
         assert!((kept + line["unresolved"].as_f64().unwrap() - 1.0).abs() < 1e-9);
         for edge in line["edges"].as_array().unwrap() {
             assert!(edge["reason"].as_str().unwrap().starts_with("edge "));

@@ -22,6 +22,13 @@ Bearings are from the robot's nose, left is positive. Exit code 1 if the name is
 pub struct WhereArgs {
     /// A name, or a whole question.
     name: String,
+    #[command(flatten)]
+    asked: AskedArgs,
+}
+
+/// What all questions take.
+#[derive(Debug, clap::Args)]
+struct AskedArgs {
     /// Which map.
     #[arg(long, default_value = "main")]
     map: String,
@@ -39,30 +46,23 @@ pub struct WhereArgs {
 Example:
   toponym labels --map floor2")]
 pub struct LabelsArgs {
-    /// Which map.
-    #[arg(long, default_value = "main")]
-    map: String,
-    /// Print the server's answer as it is.
-    #[arg(long)]
-    json: bool,
-    /// How long to wait for it.
-    #[arg(long, value_name = "S", default_value = "5", value_parser = super::seconds)]
-    timeout: Duration,
+    #[command(flatten)]
+    asked: AskedArgs,
 }
 
 pub async fn find(endpoint: &str, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
     let session = toponym::open(endpoint).await?;
-    let planner = Planner::new(&session, site, &args.map, args.timeout)?;
+    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.where_is(&args.name).await?;
-    print(&if args.json { json(&reply)? } else { where_text(&reply) })?;
+    print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
     Ok(if reply.candidates.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 
 pub async fn labels(endpoint: &str, site: &str, args: &LabelsArgs) -> Result<u8, Failure> {
     let session = toponym::open(endpoint).await?;
-    let planner = Planner::new(&session, site, &args.map, args.timeout)?;
+    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.labels().await?;
-    print(&if args.json { json(&reply)? } else { labels_text(&reply) })?;
+    print(&if args.asked.json { json(&reply)? } else { labels_text(&reply) })?;
     Ok(if reply.labels.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 

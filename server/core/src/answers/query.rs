@@ -118,9 +118,7 @@ pub struct EdgeView {
 /// A distinct graph of the posterior.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ParticleView {
-    /// Particles that hold it.
-    pub count: u32,
-    /// Their weight together; all sum to one with what is unresolved.
+    /// Its posterior mass; all sum to one with what is unresolved.
     pub weight: f64,
     /// Its loop edges.
     pub edges: Vec<EdgeView>,

@@ -19,7 +19,7 @@ use crate::language::act::{About, Head, Question};
 use crate::language::{self, Content, Name};
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
-use crate::track::front::OpenPlace;
+use crate::track::places::OpenPlace;
 use nalgebra::Matrix3;
 use std::collections::BTreeMap;
 use std::sync::Arc;
@@ -153,7 +153,6 @@ impl Snapshot {
             i_from_j: e.i_from_j,
         });
         ParticleView {
-            count: 1,
             weight: (1.0 - self.unresolved) * p.weight(),
             edges: edges.collect(),
             poses: poses(p, &self.places, &self.open),

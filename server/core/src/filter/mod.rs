@@ -40,7 +40,7 @@ use crate::filter::words::Words;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
 use crate::smoothing::{Belief, FactorId, SmoothError, Structure};
-use crate::track::front::{Chain, FrozenPlace};
+use crate::track::places::{Chain, FrozenPlace};
 use nalgebra::Matrix3;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -120,7 +120,7 @@ impl Filter {
             place: t.into(),
             stamp_ns: self.graph.place(t).stamp_ns,
             proposed,
-            weights: self.particles.iter().map(|p| (1, (1.0 - self.unresolved()) * p.weight())).collect(),
+            weights: self.particles.iter().map(|p| (1.0 - self.unresolved()) * p.weight()).collect(),
             unresolved: self.unresolved(),
             effective_sample_size,
         }

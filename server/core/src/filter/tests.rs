@@ -2,7 +2,7 @@ use super::*;
 use crate::filter::words::Silence;
 use crate::scan::matching::Mode;
 use crate::scan::place::Content;
-use crate::track::front::OpenPlace;
+use crate::track::places::OpenPlace;
 use nalgebra::Vector3;
 
 /// Where the chain's ends fit so that both answers are likely.

@@ -156,7 +156,7 @@ mod tests {
     use crate::config::Config;
     use crate::scan::place::Content;
     use crate::smoothing::Factor;
-    use crate::track::front::{Chain, FrozenPlace, OpenPlace};
+    use crate::track::places::{Chain, FrozenPlace, OpenPlace};
     use nalgebra::{Matrix3, Vector3};
     use std::sync::Arc;
 

@@ -3,7 +3,7 @@
 //! An iterated Kalman filter on the body's pose in a local map: odometry predicts, registration
 //! to the scans of the last metres of path corrects. Its frame drifts; only its increments are
 //! used: the chain edges between successive places and each scan's pose in its place. Odometry is
-//! calibrated meanwhile (`scan/wheels.rs`), and carries the robot over stretches where the laser
+//! calibrated meanwhile (`track/wheels.rs`), and carries the robot over stretches where the laser
 //! sees nothing; the local maps on both sides are then tied as a whole (`front/bridge.rs`).
 
 use self::bridge::Dark;
@@ -14,6 +14,7 @@ use crate::scan::align::SIGMA_M;
 use crate::scan::place::Content;
 use crate::scan::sweep::Sweep;
 use crate::track::local::LocalMap;
+use crate::track::places::{Chain, FrozenPlace, OpenPlace, Placed};
 use crate::track::wheels::{Drift, Wheels};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
@@ -55,59 +56,6 @@ struct Key {
     front_from_body: Pose2,
     path_m: f64,
     sweep: Sweep,
-}
-
-/// A place whose surroundings are still being seen.
-#[derive(Clone, Debug, Serialize, Deserialize)]
-pub struct OpenPlace {
-    /// Its id.
-    pub id: PlaceId,
-    /// Stamp of its first scan.
-    pub stamp_ns: StampNs,
-    /// Its frame in the front end's.
-    pub front_from_place: Pose2,
-    /// Path travelled when it began.
-    pub path_m: f64,
-    /// The chain edge from the place before.
-    pub chain: Chain,
-}
-
-/// The edge from a place to the next.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Chain {
-    /// The next place in the frame of the one before.
-    pub previous_from_this: Pose2,
-    /// Its information, right perturbation.
-    pub information: Matrix3<f64>,
-    /// Whether odometry broke between the two: they are tied by next to nothing.
-    pub broken: bool,
-    /// φ: probability that it says something else than what happened.
-    pub failed: f64,
-}
-
-/// A place that is left behind: it may now be matched.
-#[derive(Clone, Debug)]
-pub struct FrozenPlace {
-    /// Id, stamp, frame, chain.
-    pub open: OpenPlace,
-    /// What it looks like.
-    pub content: Content,
-}
-
-/// What became of a scan.
-#[derive(Clone, Debug)]
-pub struct Placed {
-    /// The place held.
-    pub place: PlaceId,
-    /// The body in its frame.
-    pub place_from_body: Pose2,
-    /// Whether the place began with this scan.
-    pub began: bool,
-    /// Places that this scan froze, oldest first.
-    pub frozen: Vec<FrozenPlace>,
-    /// How the body's pose in the front end's frame was corrected without a motion, if it was: a blind
-    /// stretch was bridged.
-    pub new_from_old: Option<Pose2>,
 }
 
 /// State of the front end.

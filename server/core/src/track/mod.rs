@@ -9,14 +9,16 @@
 pub mod front;
 mod local;
 pub mod odometry;
+pub mod places;
 mod wheels;
 
 use crate::effects::{Effect, Effects};
 use crate::event::{Laser, Odom, Scan, Setup, StampNs};
 use crate::geometry::Pose2;
 use crate::scan::sweep::sweep;
-use crate::track::front::{FrontEnd, FrozenPlace};
+use crate::track::front::FrontEnd;
 use crate::track::odometry::{Odometry, Step};
+use crate::track::places::FrozenPlace;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 
@@ -118,7 +120,7 @@ impl Track {
         if placed.began {
             effects.push(Effect::PlaceBegan { place, stamp_ns });
         }
-        let front::Placed { began, frozen, new_from_old, .. } = placed;
+        let places::Placed { began, frozen, new_from_old, .. } = placed;
         Some(Placed { began, frozen, odom_from_body, new_from_old })
     }
 }

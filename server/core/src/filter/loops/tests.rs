@@ -1,6 +1,6 @@
 use super::*;
 use crate::scan::place::Content;
-use crate::track::front::{Chain, FrozenPlace, OpenPlace};
+use crate::track::places::{Chain, FrozenPlace, OpenPlace};
 use nalgebra::Matrix3;
 
 /// Places a metre apart along x.
