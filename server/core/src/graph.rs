@@ -1,6 +1,10 @@
 //! What all particles share: places with their scans, the chain between them, and the memo of
 //! what was matched. Append-only.
 
+pub mod spread;
+pub mod stretches;
+
+use self::stretches::Stretches;
 use crate::edge::{PlaceId, Vertex};
 use crate::event::StampNs;
 use crate::geometry::Pose2;
@@ -42,6 +46,8 @@ pub struct Matched {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Graph {
     places: Vec<Arc<Place>>,
+    /// Stretches that part the map.
+    pub stretches: Stretches,
     /// Prior-free matches by pair (older, newer).
     pub memo: BTreeMap<(Vertex, Vertex), Matched>,
 }
@@ -50,6 +56,10 @@ impl Graph {
     /// Adds a vertex and returns its index.
     pub fn add(&mut self, frozen: FrozenPlace) -> Vertex {
         let segment = self.places.last().map_or(0, |p| p.segment + u32::from(frozen.open.chain.broken));
+        if let Some(before) = self.places.last() {
+            let path_m = frozen.open.path_m - before.path_m;
+            self.stretches.extend(self.places.len() as Vertex, &frozen.open.chain, path_m);
+        }
         self.places.push(Arc::new(Place {
             id: frozen.open.id,
             stamp_ns: frozen.open.stamp_ns,

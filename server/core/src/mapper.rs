@@ -1,6 +1,5 @@
 //! The core's public face: events in, effects out.
 
-mod spread;
 mod standing;
 mod unseen;
 
@@ -70,7 +69,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 8 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 9 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -258,9 +257,28 @@ impl Mapper {
             poses.extend(open_poses(p, &places, &open));
             poses
         };
-        let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m };
+        let (part, dark) = self.parts(&open);
+        let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m, part, dark };
         self.change(effects, |filter, talk| vec![Effect::Heard(talk.hear(filter, u, &here))]);
         self.stand(effects);
+    }
+
+    /// For all places, those not left yet included: in which part of the map they are, and whether the robot sees
+    /// nothing there or soon after: in the dark the first places come late.
+    fn parts(&self, open: &[OpenPlace]) -> (Vec<usize>, Vec<bool>) {
+        let places = self.filter.graph.places();
+        let chains = places.iter().map(|p| &p.chain).chain(open.iter().map(|p| &p.chain));
+        let unseen: Vec<bool> = chains.map(|c| c.unseen).chain([self.track.front.sees_nothing()]).collect();
+        let mut stretches = self.filter.graph.stretches.clone();
+        let mut before_m = places.last().map(|p| p.path_m);
+        for (v, place) in (places.len()..).zip(open) {
+            if let Some(before_m) = before_m.replace(place.path_m) {
+                stretches.extend(v as Vertex, &place.chain, place.path_m - before_m);
+            }
+        }
+        let ends = stretches.ends();
+        let part = (0..places.len() + open.len()).map(|v| ends.partition_point(|&end| end as usize <= v));
+        (part.collect(), unseen.windows(2).map(|w| w[0] || w[1]).collect())
     }
 
     fn flush(&mut self, effects: &mut Effects) {

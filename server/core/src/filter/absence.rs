@@ -43,6 +43,8 @@ const COMPARED_SIGMA_MAX_M: f64 = 0.3;
 const COMPARED_SIGMA_MAX_RAD: f64 = 0.05;
 /// Points that must be seen or seen through for an outcome.
 const COMPARED_MIN: u32 = 20;
+/// Places along the path that are farther apart are of two floors, which either is expected to be found, metres.
+const FLOOR_M: f64 = 10.0;
 /// Path that shows the same walls, metres.
 const SAME_WALLS_M: f64 = 5.0;
 
@@ -80,17 +82,22 @@ fn log_missed(
     }
     let near = |i: Vertex| particle.belief.pose(i).distance_m(&particle.belief.pose(t)) < 3.0 * OVERLAP_M;
     let pairs: Vec<Vertex> = looked.iter().map(|(i, _)| *i).filter(|&i| shows(i) && near(i)).collect();
-    let Ok(predicted) = particle.belief.relative(structure, t, &pairs) else { return 0.0 };
-    let mut expected: f64 = 0.0;
-    for r in &predicted {
-        let overlap = p_overlap(r);
-        let found = looked.iter().filter(|(i, _)| *i == r.i).flat_map(|(_, modes)| modes);
-        if overlap > 0.01 && found.into_iter().any(|z| is_expected(r, z)) {
-            return 0.0;
-        }
-        expected = expected.max(overlap);
+    let Ok(mut predicted) = particle.belief.relative(structure, t, &pairs) else { return 0.0 };
+    predicted.sort_by_key(|r| r.i);
+    let floors = predicted.chunk_by(|a, b| !graph.apart(a.i, b.i, FLOOR_M));
+    floors.map(|floor| log_missed_of(floor, looked)).sum()
+}
+
+/// Of the places of one floor: some found is found.
+fn log_missed_of(floor: &[Relative], looked: &[(Vertex, Vec<Pose2>)]) -> f64 {
+    let found = |r: &&Relative| {
+        let of = looked.iter().filter(|(i, _)| *i == r.i).flat_map(|(_, modes)| modes);
+        p_overlap(r) > 0.01 && of.into_iter().any(|z| is_expected(r, z))
+    };
+    if floor.iter().any(|r| found(&r)) {
+        return 0.0;
     }
-    (1.0 - FOUND * expected).ln()
+    (1.0 - FOUND * floor.iter().map(p_overlap).fold(0.0, f64::max)).ln()
 }
 
 /// log c₁/c₀ if the scans contradict where the particle is certain that places lie over one another, else 0.

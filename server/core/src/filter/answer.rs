@@ -8,11 +8,14 @@ use crate::filter::question::{Question, Testimony};
 use crate::filter::weigh::Judgement;
 use crate::filter::words::Words;
 use crate::geometry::Pose2;
+use crate::graph::Graph;
 use crate::smoothing::Structure;
 
 /// Two answers that lay a place within so much of one another are one.
 const SAME_M: f64 = 1.0;
 const SAME_RAD: f64 = 0.17;
+/// Look-alikes are looked for so far from where they were seen, metres.
+const TWIN_M: f64 = 25.0;
 /// A loop raises `Σ eᵀ Ω e` by its distance² at most, and none is taken beyond some hundred: where it
 /// rises by more, Gauss-Newton has lost its way.
 const CHI2_RISE_MAX: f64 = 1000.0;
@@ -41,6 +44,8 @@ pub enum Stance {
         log_there: f64,
         /// What is let go for it.
         lets_go: Option<LetGo>,
+        /// Whether either answer expects the fit, for the place looks like what is there.
+        again: bool,
     },
 }
 
@@ -64,14 +69,40 @@ pub fn stance<'a>(
     if known {
         return Stance::There { log_gain: log_there, fits: true };
     }
+    let refused: Vec<&Question> = others.filter(|q| particle.refused.contains(&q.id)).collect();
+    match look_alike(particle, edge, &refused) {
+        Some(LookAlike::Same) => Stance::Again,
+        other => Stance::Open { log_there, lets_go, again: other.is_some() },
+    }
+}
+
+/// Why a fit is expected of the newest place by who has it elsewhere.
+enum LookAlike {
+    /// It was refused as what is there before.
+    Same,
+    /// It looks like something that looks like what is there.
+    Twin,
+}
+
+/// Whether a fit is where what a particle refused shows a look-alike of the newest place, or a look-alike of
+/// that: who looks like one of twins looks like the other.
+fn look_alike(particle: &Particle, edge: &Edge, refused: &[&Question]) -> Option<LookAlike> {
     let pose = |v: Vertex| particle.belief.pose(v);
     let (here, there) = (pose(edge.j), pose(edge.i).compose(&edge.i_from_j));
-    let says_same = |q: &Question| {
-        let there_by_q = pose(q.i).compose(&q.i_from_j).compose(&pose(q.j).between(&here));
-        same(&there, &there_by_q)
+    let older = |q: &Question, at: &Pose2| pose(q.i).compose(&q.i_from_j).compose(&pose(q.j).between(at));
+    let newer =
+        |q: &Question, at: &Pose2| pose(q.j).compose(&q.i_from_j.inverse()).compose(&pose(q.i).between(at));
+    if refused.iter().any(|q| same(&there, &older(q, &here))) {
+        return Some(LookAlike::Same);
+    }
+    let twins = |at: Pose2| {
+        let near = move |v: Vertex| pose(v).distance_m(&at) < TWIN_M;
+        let of = move |q: &&Question| [near(q.j).then(|| older(q, &at)), near(q.i).then(|| newer(q, &at))];
+        refused.iter().flat_map(of).flatten()
     };
-    let mut refused = others.filter(|q| particle.refused.contains(&q.id));
-    if refused.any(says_same) { Stance::Again } else { Stance::Open { log_there, lets_go } }
+    let is_there = |twin: Pose2| same(&there, &twin);
+    let any = twins(here).any(|twin| is_there(twin) || twins(twin).any(is_there));
+    (any && !same(&there, &here)).then_some(LookAlike::Twin)
 }
 
 /// Whether two poses are one answer.
@@ -110,14 +141,29 @@ pub fn children(particles: &[Particle], stances: &[Stance]) -> Vec<Child> {
             Stance::There { log_gain, fits } => vec![child(true, fits, log_gain)],
             Stance::Elsewhere => vec![child(false, false, 0.0)],
             Stance::Again => vec![child(false, false, again)],
-            Stance::Open { log_there, lets_go } => {
-                vec![child(false, false, 0.0), Child { lets_go, ..child(true, true, log_there) }]
+            Stance::Open { log_there, lets_go, again: is_again } => {
+                let expected = if is_again { again } else { 0.0 };
+                vec![
+                    child(false, false, expected),
+                    Child { lets_go, ..child(true, true, expected + log_there) },
+                ]
             }
         }
     };
     let mut all: Vec<Child> = particles.iter().zip(stances).enumerate().flat_map(of).collect();
     all.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight).then(a.parent.cmp(&b.parent)));
     all
+}
+
+/// What a particle's weight depends on beside itself.
+#[derive(Clone, Copy)]
+pub struct Given<'a> {
+    /// Places and chain.
+    pub graph: &'a Graph,
+    /// Factors.
+    pub structure: &'a Structure,
+    /// What was said.
+    pub words: &'a dyn Words,
 }
 
 /// A child as a particle of its own: G, X and w. Where the edge does not go with the poses, an answer that the
@@ -127,8 +173,7 @@ pub fn born(
     child: &Child,
     question: QuestionId,
     edge: Option<&Edge>,
-    structure: &Structure,
-    words: &dyn Words,
+    given: Given<'_>,
 ) -> Option<Particle> {
     let mut p = parent.clone();
     p.log_weight = child.log_weight;
@@ -138,7 +183,7 @@ pub fn born(
     }
     p.take(question);
     let Some(edge) = edge.filter(|_| child.adds) else { return Some(p) };
-    let tied = with_edge(p.clone(), edge, child.lets_go, structure, words);
+    let tied = with_edge(p.clone(), edge, child.lets_go, given);
     if tied.is_none() && !child.is_new { Some(p) } else { tied }
 }
 
@@ -148,8 +193,7 @@ pub fn with_edge(
     mut p: Particle,
     edge: &Edge,
     lets_go: Option<LetGo>,
-    structure: &Structure,
-    words: &dyn Words,
+    Given { graph, structure, words }: Given<'_>,
 ) -> Option<Particle> {
     let before = p.belief.least_chi2(structure);
     p.add(edge.clone());
@@ -158,6 +202,6 @@ pub fn with_edge(
     }
     p.update(structure).ok()?;
     // What was said before counts for the floors that are one by now.
-    p.weigh_words(words);
+    p.weigh_words(graph, words);
     (p.belief.least_chi2(structure) < before + CHI2_RISE_MAX).then_some(p)
 }

@@ -25,7 +25,7 @@ use crate::config::Config;
 use crate::edge::{EdgeKind, Proposal, Vertex};
 use crate::effects::{Effect, Effects};
 use crate::filter::absence::pay;
-use crate::filter::answer::{Child, Stance, born, children, stance};
+use crate::filter::answer::{Child, Given, Stance, born, children, stance};
 use crate::filter::chance::{log_add, log_looks};
 use crate::filter::ghosts::{Ghost, Ghosts, difference};
 use crate::filter::loops::{Fit, Loops, Measured, measure_again};
@@ -290,10 +290,11 @@ impl Filter {
             if all.iter().any(adds) { edge.clone().enter(Arc::make_mut(&mut self.structure)) } else { None };
         self.disputed.extend(entered.iter().map(|e| e.factor));
         all.iter().filter_map(|c| c.lets_go).for_each(|l| self.loosen(l.from));
-        let (structure, parents, question) = (&self.structure, &self.particles, edge.question);
+        let given = Given { graph: &self.graph, structure: &self.structure, words };
+        let (parents, question) = (&self.particles, edge.question);
         let birth = |c: &Child| {
             let edge = entered.as_ref().filter(|_| adds(c));
-            born(&parents[c.parent], c, question, edge, structure, words)
+            born(&parents[c.parent], c, question, edge, given)
         };
         let born: Vec<Option<Particle>> = all.par_iter().map(birth).collect();
         for child in all.iter().zip(&born).filter_map(|(c, born)| born.is_none().then_some(c)) {

@@ -33,6 +33,8 @@ const WAYS: f64 = 20.0;
 /// How near two places are for what is said of one to be expected of the other: standard deviation
 /// of a Gaussian kernel, the size of a room.
 const JOINED_M: f64 = 3.0;
+/// The same of places where nothing is seen: what is open so far that the laser finds no wall is one yard.
+const DARK_M: f64 = 10.0;
 
 /// Over what a name holds: which sites share what is said of them.
 pub trait Support {
@@ -53,22 +55,60 @@ fn share_of_square(distance_m2: f64) -> f64 {
 /// Beyond, [`share`] is less than 4·10⁻⁶.
 pub const REACH_M: f64 = 5.0 * JOINED_M;
 
-/// Places in one particle's map: what is said of one holds for what lies near, by [`share`].
+/// A place that something is said of, in one particle's map.
+#[derive(Clone, Copy, Debug)]
+pub struct Site {
+    /// Where it lies.
+    pub pose: Pose2,
+    /// Its floor: what nothing ties is no one room, else a fit would tie it.
+    pub floor: usize,
+    /// Whether nothing is seen there. No fit tells the dark from the dark, and it is wide.
+    pub dark: bool,
+    /// What vague stretches of path add up to before it, variance, m².
+    pub drift_m2: f64,
+}
+
+/// Share of what is said of one place that holds for another, over where they may lie.
+pub fn share_between(a: &Site, b: &Site) -> f64 {
+    let distance_m2 = (b.pose.x_m - a.pose.x_m).powi(2) + (b.pose.y_m - a.pose.y_m).powi(2);
+    if a.dark && b.dark {
+        let drift_m2 = if a.floor == b.floor { 0.0 } else { (a.drift_m2 - b.drift_m2).abs() };
+        let variance_m2 = DARK_M.powi(2) + drift_m2;
+        DARK_M.powi(2) / variance_m2 * (-0.5 * distance_m2 / variance_m2).exp()
+    } else if a.floor == b.floor {
+        share_of_square(distance_m2)
+    } else {
+        0.0
+    }
+}
+
+/// Places in one particle's map: what is said of one holds for what lies near, by [`share_between`].
 pub struct Near {
-    sites: Vec<Pose2>,
+    sites: Vec<Site>,
     /// Sites with anything said of them, by square of [`REACH_M`].
     cells: BTreeMap<(i64, i64), Vec<u32>>,
+    /// Such as lie in the dark.
+    dark: Vec<u32>,
 }
 
 impl Near {
     /// None of them has anything said of it yet.
-    pub fn new(sites: Vec<Pose2>) -> Self {
-        Self { sites, cells: BTreeMap::new() }
+    pub fn new(sites: Vec<Site>) -> Self {
+        Self { sites, cells: BTreeMap::new(), dark: Vec::new() }
+    }
+
+    /// One of them.
+    pub fn site(&self, site: usize) -> &Site {
+        &self.sites[site]
     }
 
     /// From now on something is said of a site. Once for each.
     pub fn tell(&mut self, site: usize) {
-        self.cells.entry(cell(&self.sites[site])).or_default().push(site as u32);
+        let Site { pose, dark, .. } = &self.sites[site];
+        self.cells.entry(cell(pose)).or_default().push(site as u32);
+        if *dark {
+            self.dark.push(site as u32);
+        }
     }
 }
 
@@ -79,13 +119,17 @@ fn cell(pose: &Pose2) -> (i64, i64) {
 impl Support for Near {
     fn joined(&self, here: usize, mut each: impl FnMut(usize, f64)) {
         let at = &self.sites[here];
-        let (x, y) = cell(at);
+        let (x, y) = cell(&at.pose);
         let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy)));
-        for &k in around.filter_map(|c| self.cells.get(&c)).flatten() {
-            let to = &self.sites[k as usize];
-            let distance_m2 = (to.x_m - at.x_m).powi(2) + (to.y_m - at.y_m).powi(2);
-            if distance_m2 < REACH_M * REACH_M {
-                each(k as usize, share_of_square(distance_m2));
+        let near = around.filter_map(|c| self.cells.get(&c)).flatten();
+        let is_near = |k: &&u32| {
+            let to = &self.sites[**k as usize];
+            !(at.dark && to.dark) && to.pose.distance_m(&at.pose) < REACH_M
+        };
+        for &k in near.filter(is_near).chain(self.dark.iter().filter(|_| at.dark)) {
+            match share_between(at, &self.sites[k as usize]) {
+                0.0 => {}
+                share => each(k as usize, share),
             }
         }
     }

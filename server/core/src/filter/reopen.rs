@@ -3,7 +3,7 @@
 
 use crate::effects::{Effect, Effects};
 use crate::filter::Filter;
-use crate::filter::answer::with_edge;
+use crate::filter::answer::{Given, with_edge};
 use crate::filter::ghosts::Ghost;
 use crate::filter::particle::Particle;
 use crate::filter::weigh::judge;
@@ -62,7 +62,7 @@ impl Filter {
         let mut p = self.best().clone();
         p.refused.retain(|&q| q != edge.question);
         p.log_weight += judged.log_there;
-        with_edge(p, &edge, judged.lets_go, &self.structure, words)
+        with_edge(p, &edge, judged.lets_go, Given { graph: &self.graph, structure: &self.structure, words })
     }
 
     fn give_up(&mut self, ghost: &Ghost, words: &dyn Words) -> Option<Particle> {
@@ -76,7 +76,7 @@ impl Filter {
             return None;
         }
         p.log_weight += ghost.since - judged.log_there;
-        p.weigh_words(words);
+        p.weigh_words(&self.graph, words);
         Some(p)
     }
 }

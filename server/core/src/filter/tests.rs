@@ -55,7 +55,13 @@ fn fit(i: Vertex, x_m: f64, kind: EdgeKind) -> Fit {
 
 fn chain() -> Chain {
     let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
-    Chain { previous_from_this: Pose2::new(1.0, 0.0, 0.0), information, broken: false, failed: 1e-4 }
+    Chain {
+        previous_from_this: Pose2::new(1.0, 0.0, 0.0),
+        information,
+        broken: false,
+        unseen: false,
+        failed: 1e-4,
+    }
 }
 
 fn length_m(filter: &Filter) -> f64 {

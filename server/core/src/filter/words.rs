@@ -3,19 +3,21 @@
 
 use crate::filter::Filter;
 use crate::filter::particle::Particle;
+use crate::graph::Graph;
 use rayon::prelude::*;
 
 /// What people said as evidence about graphs, relative to sentences that say nothing.
 pub trait Words: Sync {
-    /// log p(λ_1 … λ_n | G, X, L) of one particle, sentences folded in the order they were said.
-    fn log_likelihood(&self, particle: &Particle) -> f64;
+    /// log p(λ_1 … λ_n | G, X, L) of one particle, sentences folded in the order they were said; `graph` is what
+    /// all particles share.
+    fn log_likelihood(&self, graph: &Graph, particle: &Particle) -> f64;
 }
 
 /// Nobody said anything.
 pub struct Silence;
 
 impl Words for Silence {
-    fn log_likelihood(&self, _: &Particle) -> f64 {
+    fn log_likelihood(&self, _: &Graph, _: &Particle) -> f64 {
         0.0
     }
 }
@@ -24,15 +26,16 @@ impl Filter {
     /// Puts each particle's share of the words in its weight as it is now, in place of what it was when last
     /// asked: w ∝ p(λ | G) however often, and in whatever order, it is asked.
     pub fn weigh_words(&mut self, words: &dyn Words) {
-        self.particles.par_iter_mut().for_each(|p| p.weigh_words(words));
+        let graph = &self.graph;
+        self.particles.par_iter_mut().for_each(|p| p.weigh_words(graph, words));
         self.rank();
     }
 }
 
 impl Particle {
     /// [`Filter::weigh_words`] of one particle, its weight not normalised yet: for a child just born too.
-    pub fn weigh_words(&mut self, words: &dyn Words) {
-        let now = words.log_likelihood(self);
+    pub fn weigh_words(&mut self, graph: &Graph, words: &dyn Words) {
+        let now = words.log_likelihood(graph, self);
         self.log_weight += now - self.log_words;
         self.log_words = now;
     }
@@ -47,7 +50,7 @@ mod tests {
     struct Saying(f64);
 
     impl Words for Saying {
-        fn log_likelihood(&self, particle: &Particle) -> f64 {
+        fn log_likelihood(&self, _: &Graph, particle: &Particle) -> f64 {
             self.0 * particle.failed.len() as f64
         }
     }

@@ -15,8 +15,8 @@ use crate::effects::TrackState;
 use crate::filter::Filter;
 use crate::filter::particle::Particle;
 use crate::geometry::{Pose2, wrap};
-use crate::mapper::spread::Spread;
-use crate::mapper::unseen::{Stretches, Way, ahead};
+use crate::graph::spread::Spread;
+use crate::mapper::unseen::{Way, ahead};
 use crate::track::front::FrontEnd;
 use serde::{Deserialize, Serialize};
 
@@ -30,7 +30,6 @@ const WORTH_TELLING: f64 = 0.5;
 /// What is remembered from scan to scan.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Standing {
-    stretches: Stretches,
     /// As told last; none before the first scan.
     state: Option<TrackState>,
     /// Each particle's way, until the posterior changes.
@@ -91,8 +90,7 @@ impl Standing {
     }
 
     fn look(&mut self, filter: &Filter, front: &FrontEnd, told: &Pose2, ahead: Spread) -> Doubt {
-        self.stretches.extend(&filter.graph, front);
-        let vague = self.stretches.vague();
+        let vague = filter.graph.stretches.vague();
         let ways =
             self.ways.get_or_insert_with(|| filter.particles.iter().map(|p| Way::of(p, &vague)).collect());
         let kept = 1.0 - filter.unresolved();
@@ -170,6 +168,7 @@ mod tests {
                 previous_from_this: Pose2::new(1.0, 0.0, 0.0),
                 information,
                 broken: false,
+                unseen: false,
                 failed: 1e-4,
             };
             let front_from_place = Pose2::new(x_m, 0.0, 0.0);

@@ -14,38 +14,11 @@
 use crate::edge::Vertex;
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
-use crate::graph::Graph;
-use crate::mapper::spread::Spread;
+use crate::graph::spread::Spread;
+use crate::graph::stretches::{Stretch, carried};
 use crate::track::front::FrontEnd;
-use crate::track::places::Chain;
 use nalgebra::Matrix3;
-use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-
-/// A stretch over which the robot surely knew where it was parts nothing.
-const SURE: f64 = 0.999;
-
-/// From the last place that was seen to the first that is seen again, or to the newest.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Stretch {
-    /// The first place that is not tied to the one before by any scan, and the last of these.
-    first: Vertex,
-    last: Vertex,
-    /// Of the last, seen from the place before the first; right perturbation.
-    covariance: Matrix3<f64>,
-    /// Length.
-    pub path_m: f64,
-    /// Whether odometry broke on it.
-    pub broken: bool,
-}
-
-/// All of them, oldest first.
-#[derive(Clone, Debug, Default, Serialize, Deserialize)]
-pub struct Stretches {
-    /// Places looked at.
-    known: usize,
-    all: Vec<Stretch>,
-}
 
 /// A particle's best tied way from the first place of its map to the newest.
 #[derive(Clone, Copy, Debug, Default)]
@@ -54,43 +27,6 @@ pub struct Way {
     pub spread: Spread,
     /// The newest stretch on it.
     stretch: Option<usize>,
-}
-
-impl Stretches {
-    /// Takes in the places that have come since.
-    pub fn extend(&mut self, graph: &Graph, front: &FrontEnd) {
-        for v in self.known.max(1)..graph.places().len() {
-            let v = v as Vertex;
-            let place = graph.place(v);
-            if place.chain.broken || front.was_unseen(place.id) {
-                self.add(v, &place.chain, place.path_m - graph.place(v - 1).path_m);
-            }
-        }
-        self.known = graph.places().len();
-    }
-
-    fn add(&mut self, v: Vertex, chain: &Chain, path_m: f64) {
-        let before = self.all.pop_if(|s| s.last + 1 == v);
-        let before = before.unwrap_or_else(|| Stretch {
-            first: v,
-            last: v,
-            covariance: Matrix3::zeros(),
-            path_m: 0.0,
-            broken: false,
-        });
-        self.all.push(Stretch {
-            last: v,
-            covariance: carried(&before.covariance, chain),
-            path_m: before.path_m + path_m,
-            broken: before.broken || chain.broken,
-            ..before
-        });
-    }
-
-    /// Those that leave it open where the robot was at their end.
-    pub fn vague(&self) -> Vec<&Stretch> {
-        self.all.iter().filter(|s| Spread::new(&s.covariance, 0.0).near([0.0; 3]) < SURE).collect()
-    }
 }
 
 impl Way {
@@ -165,7 +101,7 @@ pub fn ahead(front: &FrontEnd, map_from_front: &Pose2) -> Option<Spread> {
         }
     };
     for place in front.open_places() {
-        if place.chain.broken || front.was_unseen(place.id) {
+        if place.chain.broken || place.chain.unseen {
             let before = on.take().map_or_else(Matrix3::zeros, |(_, covariance)| covariance);
             on = Some((place.front_from_place, carried(&before, &place.chain)));
         } else {
@@ -184,16 +120,13 @@ pub fn ahead(front: &FrontEnd, map_from_front: &Pose2) -> Option<Spread> {
     ahead
 }
 
-fn carried(covariance: &Matrix3<f64>, chain: &Chain) -> Matrix3<f64> {
-    let f = chain.previous_from_this.inverse().adjoint();
-    f * covariance * f.transpose() + chain.information.try_inverse().unwrap_or_else(Matrix3::zeros)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::edge::EdgeKind;
     use crate::filter::particle::Edge;
+    use crate::graph::stretches::Stretches;
+    use crate::track::places::Chain;
     use nalgebra::Vector3;
 
     fn diagonal(sigma_m: f64) -> Matrix3<f64> {
@@ -205,13 +138,9 @@ mod tests {
         let mut stretches = Stretches::default();
         for &(v, sigma_m) in ends {
             let information = diagonal(sigma_m).try_inverse().unwrap();
-            let chain = Chain {
-                previous_from_this: Pose2::new(1.0, 0.0, 0.0),
-                information,
-                broken: false,
-                failed: 1e-4,
-            };
-            stretches.add(v, &chain, 1.0);
+            let previous_from_this = Pose2::new(1.0, 0.0, 0.0);
+            let chain = Chain { previous_from_this, information, broken: false, unseen: true, failed: 1e-4 };
+            stretches.extend(v, &chain, 1.0);
         }
         stretches
     }
@@ -236,15 +165,6 @@ mod tests {
 
     fn near(stretches: &Stretches, ties: &[(Vertex, Vertex, f64)]) -> f64 {
         Way::of(&graph(ties), &stretches.vague()).spread.near([0.0; 3])
-    }
-
-    #[test]
-    fn successive_places_of_the_dark_are_one_stretch() {
-        let stretches = stretches(&[(5, 0.5), (6, 0.5), (7, 0.5), (20, 0.1)]);
-        assert_eq!(stretches.all.len(), 2);
-        assert_eq!((stretches.all[0].first, stretches.all[0].last, stretches.all[0].path_m), (5, 7, 3.0));
-        assert!(stretches.all[0].covariance[(0, 0)] > 0.74);
-        assert_eq!(stretches.vague().len(), 1, "a hand's breadth parts nothing");
     }
 
     #[test]

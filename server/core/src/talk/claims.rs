@@ -7,7 +7,7 @@ use crate::geometry::Pose2;
 use crate::language::act::Sameness;
 use crate::talk::Here;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// One thing that an utterance claims and that is likelier in some graphs than in others.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -100,6 +100,8 @@ struct Ahead {
     of: Option<Vertex>,
     /// From there, by the front end, that all particles share.
     of_from_place: Pose2,
+    /// The part of the map that it is in.
+    part: usize,
 }
 
 /// Every claim in the order said.
@@ -107,6 +109,8 @@ struct Ahead {
 pub struct Testimonies {
     said: Vec<Testimony>,
     ahead: BTreeMap<Vertex, Ahead>,
+    /// Places spoken of where nothing was seen.
+    dark: BTreeSet<Vertex>,
 }
 
 impl Testimonies {
@@ -123,11 +127,28 @@ impl Testimonies {
         for v in claims().flat_map(|(_, claim)| claim.places()).filter(|&v| v >= known) {
             let of = known.checked_sub(1);
             if let (Some(from), Some(to)) = (poses.get(of.unwrap_or(0) as usize), poses.get(v as usize)) {
-                self.ahead.entry(v).or_insert(Ahead { of, of_from_place: from.between(to) });
+                let part = here.part.get(v as usize).copied().unwrap_or(0);
+                self.ahead.entry(v).or_insert(Ahead { of, of_from_place: from.between(to), part });
             }
         }
+        let is_dark = |v: &Vertex| here.dark.get(*v as usize) == Some(&true);
+        self.dark.extend(claims().flat_map(|(_, claim)| claim.places()).filter(is_dark));
         if claims().next().is_some() {
             self.said.push(testimony);
+        }
+    }
+
+    /// Whether nothing was seen where a place was spoken of.
+    pub fn is_dark(&self, v: Vertex) -> bool {
+        self.dark.contains(&v)
+    }
+
+    /// In which part of the map a place is, be it in a particle's graph by now or not; `ends` part it, see
+    /// [`Stretches::ends`](crate::graph::stretches::Stretches::ends).
+    pub fn part(&self, particle: &Particle, ends: &[Vertex], v: Vertex) -> usize {
+        match self.ahead.get(&v) {
+            Some(ahead) if (v as usize) >= particle.belief.len() => ahead.part,
+            _ => ends.partition_point(|&end| end <= v),
         }
     }
 
@@ -137,7 +158,7 @@ impl Testimonies {
         if (v as usize) < belief.len() {
             return Some(belief.pose(v));
         }
-        let Ahead { of, of_from_place } = self.ahead.get(&v)?;
+        let Ahead { of, of_from_place, .. } = self.ahead.get(&v)?;
         let of = of.unwrap_or(0);
         if (of as usize) < belief.len() {
             return Some(belief.pose(of).compose(of_from_place));

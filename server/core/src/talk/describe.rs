@@ -361,7 +361,13 @@ mod tests {
         filter.particles = vec![apart, near];
         let path_m: Vec<f64> = (0..21).map(f64::from).collect();
         for (held, text) in [(0, "this is the gym"), (20, "this is the kitchen"), (10, sentence)] {
-            let here = Here { held: Some(held), poses: &|p| p.belief.poses(), path_m: path_m.clone() };
+            let here = Here {
+                held: Some(held),
+                poses: &|p| p.belief.poses(),
+                path_m: path_m.clone(),
+                part: vec![],
+                dark: vec![],
+            };
             let u = Utterance { id: text.into(), text: text.into(), ..Utterance::default() };
             assert_eq!(talk.hear(&mut filter, &u, &here).status, HeardStatus::Understood);
         }

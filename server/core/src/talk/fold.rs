@@ -10,9 +10,11 @@
 
 use crate::edge::Vertex;
 use crate::filter::labels::LabelId;
-use crate::filter::naming::{BASE, BaseMeasure, Near, REACH_M, Support, Tally, share, unless_false};
+use crate::filter::naming::{
+    BASE, BaseMeasure, Near, REACH_M, Site, Support, Tally, share, share_between, unless_false,
+};
 use crate::filter::particle::Particle;
-use crate::geometry::Pose2;
+use crate::graph::stretches::Stretch;
 use crate::language::Name;
 use crate::language::act::Sameness;
 use crate::talk::Talk;
@@ -30,13 +32,13 @@ const VISITED_BACK: Vertex = 12;
 /// Two successive places are hardly farther apart.
 const SPACING_MAX_M: f64 = 2.0;
 
-/// log p(λ_1 … λ_n | G, X, L), relative to sentences that say nothing.
-pub fn log_likelihood(talk: &Talk, particle: &Particle) -> f64 {
+/// log p(λ_1 … λ_n | G, X, L), relative to sentences that say nothing; `vague` stretches part the map.
+pub fn log_likelihood(talk: &Talk, vague: &[&Stretch], particle: &Particle) -> f64 {
     let standing = talk.standing();
     if standing.is_empty() {
         return 0.0;
     }
-    let mut fold = Fold::new(talk, particle, &standing);
+    let mut fold = Fold::new(talk, Floors::of(vague, particle), particle, &standing);
     let log_ratios = standing.iter().map(|(t, units)| {
         let ratio = fold.ratio(t, units);
         fold.hear(units);
@@ -134,9 +136,48 @@ impl Joined {
     }
 }
 
+/// The parts of a map that a particle's revisits tie.
+struct Floors {
+    /// Last places of the stretches between parts.
+    ends: Vec<Vertex>,
+    /// By part, what the stretches before it add up to: variance, m².
+    drift_m2: Vec<f64>,
+    /// By part.
+    of: Vec<usize>,
+}
+
+impl Floors {
+    fn of(vague: &[&Stretch], particle: &Particle) -> Self {
+        let ends: Vec<Vertex> = vague.iter().map(|s| s.last).collect();
+        let variance_m2 = |s: &&Stretch| (s.covariance[(0, 0)] + s.covariance[(1, 1)]) / 2.0;
+        let drift_m2 = vague.iter().map(variance_m2).scan(0.0, |sum, m2| {
+            *sum += m2;
+            Some(*sum)
+        });
+        let drift_m2 = std::iter::once(0.0).chain(drift_m2).collect();
+        let mut of: Vec<usize> = (0..=ends.len()).collect();
+        if !ends.is_empty() {
+            let part = |v: Vertex| ends.partition_point(|&end| end <= v);
+            for e in particle.edges.iter() {
+                let (a, b) = (of[part(e.i)], of[part(e.j)]);
+                if a != b {
+                    of.iter_mut().filter(|f| **f == a).for_each(|f| *f = b);
+                }
+            }
+        }
+        Self { ends, drift_m2, of }
+    }
+
+    /// Of a part; one that has no end yet is for itself.
+    fn floor(&self, part: usize) -> usize {
+        self.of.get(part).copied().unwrap_or(part)
+    }
+}
+
 /// What was said so far, over one particle's map.
 struct Fold<'a> {
     talk: &'a Talk,
+    floors: Floors,
     particle: &'a Particle,
     base: BaseMeasure,
     /// Sites by place.
@@ -149,22 +190,36 @@ struct Fold<'a> {
 
 impl<'a> Fold<'a> {
     /// Nothing heard yet, but p₀ known of all that will be.
-    fn new(talk: &'a Talk, particle: &'a Particle, standing: &[(&Testimony, Vec<Units>)]) -> Self {
+    fn new(
+        talk: &'a Talk,
+        floors: Floors,
+        particle: &'a Particle,
+        standing: &[(&Testimony, Vec<Units>)],
+    ) -> Self {
         let names = talk.ledger.names().len();
         let mut base = BaseMeasure::new(names);
         (0..names as LabelId).filter(|&label| talk.is_way(label)).for_each(|label| base.is_of_ways(label));
         let (mut numbers, mut sites) = (BTreeMap::new(), Vec::new());
         for units in standing.iter().flat_map(|(_, units)| units) {
             base.count(units.label, units.tally.said);
-            if let Some(pose) = talk.testimonies.pose(particle, units.place) {
+            if let Some(site) = site(talk, &floors, particle, units.place) {
                 numbers.entry(units.place).or_insert_with(|| {
-                    sites.push(pose);
+                    sites.push(site);
                     sites.len() - 1
                 });
             }
         }
         let told = vec![Vec::new(); sites.len()];
-        Self { talk, particle, base, numbers, near: Near::new(sites), told, joined: Joined::of(names) }
+        Self {
+            talk,
+            floors,
+            particle,
+            base,
+            numbers,
+            near: Near::new(sites),
+            told,
+            joined: Joined::of(names),
+        }
     }
 
     fn hear(&mut self, units: &[Units]) {
@@ -258,35 +313,48 @@ impl<'a> Fold<'a> {
 
     /// "This is where we started": density of lying in one room, over that of any two places.
     fn one(&self, a: Vertex, b: Vertex, same: bool) -> f64 {
-        let pose = |v| self.talk.testimonies.pose(self.particle, v);
-        let (Some(a), Some(b)) = (pose(a), pose(b)) else { return 1.0 };
-        so(share(a.distance_m(&b)), ONE_BY_CHANCE, same)
+        let at = |v| site(self.talk, &self.floors, self.particle, v);
+        let (Some(a), Some(b)) = (at(a), at(b)) else { return 1.0 };
+        so(share_between(&a, &b), ONE_BY_CHANCE, same)
     }
 
     /// "We have been here before".
     fn visited(&self, place: Vertex, before: bool) -> f64 {
-        let Some(here) = self.talk.testimonies.pose(self.particle, place) else { return 1.0 };
-        so(share(nearest_m(self.particle, place, &here)), VISITED_BY_CHANCE, before)
+        let Some(here) = site(self.talk, &self.floors, self.particle, place) else { return 1.0 };
+        so(share(self.nearest_m(place, &here)), VISITED_BY_CHANCE, before)
     }
+
+    /// How near the path came before on the same floor, up to some metres before the place. Far stretches are
+    /// skipped: a path is no shorter than the straight line.
+    fn nearest_m(&self, place: Vertex, here: &Site) -> f64 {
+        let (belief, ends) = (&self.particle.belief, &self.floors.ends);
+        let end = place.saturating_sub(VISITED_BACK).min(belief.len() as Vertex);
+        let (mut v, mut nearest_m) = (0, f64::INFINITY);
+        while v < end {
+            let part = ends.partition_point(|&end| end <= v);
+            if self.floors.floor(part) != here.floor {
+                v = ends.get(part).map_or(end, |&next| next);
+                continue;
+            }
+            let distance_m = belief.pose(v).distance_m(&here.pose);
+            nearest_m = nearest_m.min(distance_m);
+            v += (((distance_m - nearest_m.min(REACH_M)) / SPACING_MAX_M) as Vertex).max(1);
+        }
+        nearest_m
+    }
+}
+
+/// A place in a particle's map.
+fn site(talk: &Talk, floors: &Floors, particle: &Particle, v: Vertex) -> Option<Site> {
+    let pose = talk.testimonies.pose(particle, v)?;
+    let part = talk.testimonies.part(particle, &floors.ends, v);
+    let drift_m2 = floors.drift_m2[part.min(floors.ends.len())];
+    Some(Site { pose, floor: floors.floor(part), dark: talk.testimonies.is_dark(v), drift_m2 })
 }
 
 /// What a yes or no says where the truth is `is`, and is so `by_chance`.
 fn so(is: f64, by_chance: f64, said: bool) -> f64 {
     unless_false(if said { is / by_chance } else { (1.0 - is) / (1.0 - by_chance) })
-}
-
-/// How near the path came before, up to some metres before the place. Far stretches are skipped: a path
-/// is no shorter than the straight line.
-fn nearest_m(particle: &Particle, place: Vertex, here: &Pose2) -> f64 {
-    let belief = &particle.belief;
-    let end = place.saturating_sub(VISITED_BACK).min(belief.len() as Vertex);
-    let (mut v, mut nearest_m) = (0, f64::INFINITY);
-    while v < end {
-        let distance_m = belief.pose(v).distance_m(here);
-        nearest_m = nearest_m.min(distance_m);
-        v += (((distance_m - nearest_m.min(REACH_M)) / SPACING_MAX_M) as Vertex).max(1);
-    }
-    nearest_m
 }
 
 #[cfg(test)]

@@ -22,6 +22,7 @@ use crate::filter::Filter;
 use crate::filter::particle::Particle;
 use crate::filter::words::Words;
 use crate::geometry::Pose2;
+use crate::graph::Graph;
 use claims::Testimonies;
 use ledger::Ledger;
 use serde::{Deserialize, Serialize};
@@ -35,6 +36,10 @@ pub struct Here<'a> {
     pub poses: &'a (dyn Fn(&Particle) -> Vec<Pose2> + Sync),
     /// Path travelled up to each place, metres.
     pub path_m: Vec<f64>,
+    /// Of each place, in how many parts the path before it falls, see [`crate::graph::stretches`].
+    pub part: Vec<usize>,
+    /// Of each place, whether the robot sees nothing there, or soon after.
+    pub dark: Vec<bool>,
 }
 
 /// All that was said of one map.
@@ -47,8 +52,8 @@ pub struct Talk {
 }
 
 impl Words for Talk {
-    fn log_likelihood(&self, particle: &Particle) -> f64 {
-        fold::log_likelihood(self, particle)
+    fn log_likelihood(&self, graph: &Graph, particle: &Particle) -> f64 {
+        fold::log_likelihood(self, &graph.stretches.vague(), particle)
     }
 }
 

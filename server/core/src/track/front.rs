@@ -87,8 +87,6 @@ pub struct FrontEnd {
     open: VecDeque<OpenPlace>,
     /// A blind stretch that is not dealt with yet.
     dark: Option<Dark>,
-    /// Places that no scan ties to the one before, ascending.
-    unseen: Vec<PlaceId>,
     /// The local map; a function of `keys`.
     #[serde(skip)]
     local: Option<LocalMap>,
@@ -115,7 +113,6 @@ impl FrontEnd {
             keys: VecDeque::new(),
             open: VecDeque::new(),
             dark: None,
-            unseen: Vec::new(),
             local: None,
         }
     }
@@ -158,11 +155,6 @@ impl FrontEnd {
     /// Whether the newest motion is odometry's alone, too far to be a scan or two that failed.
     pub fn sees_nothing(&self) -> bool {
         self.unseen_m() > UNSEEN_SHARE * self.spacing_m
-    }
-
-    /// Whether only odometry ties a place to the one before.
-    pub fn was_unseen(&self, place: PlaceId) -> bool {
-        self.unseen.binary_search(&place).is_ok()
     }
 
     /// Takes a scan with the odometry at its stamp.
@@ -278,9 +270,7 @@ impl FrontEnd {
         let previous_from_this = self.newest_place.between(&self.front_from_body);
         self.newest_place = self.front_from_body;
         let d_m = last.map_or(0.0, |p| self.path_m - p.path_m);
-        if self.unseen_m() > UNSEEN_SHARE * d_m {
-            self.unseen.push(self.next_place);
-        }
+        let unseen = self.unseen_m() > UNSEEN_SHARE * d_m;
         let bend = Matrix3::from_diagonal(&BEND.component_mul(&BEND)) * ((1.0 + d_m) * self.rough_m.powi(2));
         let in_the_dark = self.ends_in_the_dark(self.next_place);
         // Systematic errors in the dark add up over all of it, and are dealt out once it is over.
@@ -290,6 +280,7 @@ impl FrontEnd {
             previous_from_this,
             information,
             broken,
+            unseen,
             failed: std::mem::replace(&mut self.failed, FAILED_MIN),
         };
         self.open.push_back(OpenPlace {

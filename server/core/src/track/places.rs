@@ -31,6 +31,8 @@ pub struct Chain {
     pub information: Matrix3<f64>,
     /// Whether odometry broke between the two: they are tied by next to nothing.
     pub broken: bool,
+    /// Whether no scan ties the two, but odometry alone.
+    pub unseen: bool,
     /// φ: probability that it says something else than what happened.
     pub failed: f64,
 }

@@ -8,8 +8,13 @@ pub(crate) fn straight(n: Vertex) -> Graph {
     let mut graph = Graph::default();
     for v in 0..n {
         let previous_from_this = Pose2::new(1.0, 0.0, 0.0);
-        let chain =
-            Chain { previous_from_this, information: Matrix3::identity(), broken: false, failed: 1e-4 };
+        let chain = Chain {
+            previous_from_this,
+            information: Matrix3::identity(),
+            broken: false,
+            unseen: false,
+            failed: 1e-4,
+        };
         let path_m = f64::from(v);
         let front_from_place = Pose2::new(path_m, 0.0, 0.0);
         let open = OpenPlace { id: v.into(), stamp_ns: 0, front_from_place, path_m, chain };

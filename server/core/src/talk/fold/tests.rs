@@ -1,5 +1,6 @@
 use super::*;
 use crate::filter::naming::FALSE_TALK;
+use crate::geometry::Pose2;
 use crate::language::Name;
 use crate::language::act::Parse;
 use crate::smoothing::Structure;
@@ -41,7 +42,8 @@ impl Talk {
         };
         Arc::make_mut(&mut self.ledger).enter(entry, false);
         let readings = readings.into_iter().map(|(weight, claims)| Claims { weight, claims }).collect();
-        let here = Here { held: None, poses: &|p| p.belief.poses(), path_m: vec![] };
+        let here =
+            Here { held: None, poses: &|p| p.belief.poses(), path_m: vec![], part: vec![], dark: vec![] };
         self.testimonies.add(Testimony { utterance: number, readings }, best, &here);
         number
     }
@@ -61,10 +63,10 @@ fn third(x_m: f64, claim: Claim) -> f64 {
     let (gym, kitchen) = (talk.name(0), talk.name(1));
     talk.claim(&map, &[called(0, gym)]);
     talk.claim(&map, &[called(1, kitchen)]);
-    let before = log_likelihood(&talk, &map);
+    let before = log_likelihood(&talk, &[], &map);
     assert!(before.abs() < 1e-12, "new places are called anything");
     talk.claim(&map, &[claim]);
-    log_likelihood(&talk, &map)
+    log_likelihood(&talk, &[], &map)
 }
 
 fn gym(x_m: f64, again: Sameness) -> f64 {
@@ -109,7 +111,7 @@ fn been_here_before_speaks_for_the_maps_that_come_back() {
         x_m.extend((0..30).map(|k| back_m + f64::from(k)));
         let (mut talk, map) = (Talk::default(), map(&x_m));
         talk.claim(&map, &[Claim::Visited { place: 89, before }]);
-        log_likelihood(&talk, &map)
+        log_likelihood(&talk, &[], &map)
     };
     assert!(claims(10.0, true) > 1.0 && claims(10.0, false) < -2.0);
     assert!(claims(200.0, true) < -2.0 && claims(200.0, false) > 0.2);
@@ -123,7 +125,7 @@ fn words_said_before_an_edge_count_for_it() {
     let gym = talk.name(0);
     talk.claim(&apart, &[called(0, gym)]);
     talk.claim(&apart, &[called(2, gym)]);
-    let gain = log_likelihood(&talk, &closed) - log_likelihood(&talk, &apart);
+    let gain = log_likelihood(&talk, &[], &closed) - log_likelihood(&talk, &[], &apart);
     assert!(gain > 3.0, "{gain}");
 }
 
@@ -140,10 +142,10 @@ fn a_place_spoken_of_ahead_of_the_graph_lies_where_it_will() {
     for (utterance, place) in [(0, 0), (1, 2)] {
         talk.claim(&early, &[]);
         let readings = vec![Claims { weight: 1.0, claims: vec![(1.0, called(place, gym))] }];
-        let here = Here { held: Some(2), poses: &poses, path_m: vec![] };
+        let here = Here { held: Some(2), poses: &poses, path_m: vec![], part: vec![], dark: vec![] };
         talk.testimonies.add(Testimony { utterance, readings }, &early, &here);
     }
-    let (before, after) = (log_likelihood(&talk, &early), log_likelihood(&talk, &late));
+    let (before, after) = (log_likelihood(&talk, &[], &early), log_likelihood(&talk, &[], &late));
     assert!(before > 3.0 && (before - after).abs() < 1e-9, "{before} {after}");
     // The same before there is any graph.
     let mut talk = Talk::default();
@@ -153,11 +155,11 @@ fn a_place_spoken_of_ahead_of_the_graph_lies_where_it_will() {
     for (utterance, place) in [(0, 0), (1, 2)] {
         talk.claim(&none, &[]);
         let readings = vec![Claims { weight: 1.0, claims: vec![(1.0, called(place, gym))] }];
-        let here = Here { held: Some(2), poses: &all, path_m: vec![] };
+        let here = Here { held: Some(2), poses: &all, path_m: vec![], part: vec![], dark: vec![] };
         talk.testimonies.add(Testimony { utterance, readings }, &none, &here);
     }
     for map in [&none, &map(&[0.0]), &late] {
-        assert!((log_likelihood(&talk, map) - after).abs() < 1e-9);
+        assert!((log_likelihood(&talk, &[], map) - after).abs() < 1e-9);
     }
 }
 
@@ -169,9 +171,9 @@ fn readings_are_summed_inside() {
         let gym = talk.name(0);
         talk.name(1);
         talk.claim(&map, &[called(0, gym)]);
-        let before = log_likelihood(&talk, &map);
+        let before = log_likelihood(&talk, &[], &map);
         talk.claim_by(&map, readings);
-        (log_likelihood(&talk, &map) - before).exp()
+        (log_likelihood(&talk, &[], &map) - before).exp()
     };
     let (is, not) = (called(2, 0), Claim::Denied { place: 2, said: 0 });
     let sure = of(vec![(1.0, vec![(1.0, is)])]);
@@ -187,13 +189,13 @@ fn what_is_taken_back_was_never_said_and_may_be_said_again() {
     let mut talk = Talk::default();
     let gym = talk.name(0);
     talk.claim(&map, &[called(0, gym)]);
-    let before = log_likelihood(&talk, &map);
+    let before = log_likelihood(&talk, &[], &map);
     let number = talk.claim(&map, &[called(2, gym)]);
-    let after = log_likelihood(&talk, &map);
+    let after = log_likelihood(&talk, &[], &map);
     Arc::make_mut(&mut talk.ledger).strike(number);
-    assert!((log_likelihood(&talk, &map) - before).abs() < 1e-12 && after - before > 3.0);
+    assert!((log_likelihood(&talk, &[], &map) - before).abs() < 1e-12 && after - before > 3.0);
     talk.claim(&map, &[called(2, gym)]);
-    assert!((log_likelihood(&talk, &map) - after).abs() < 1e-12);
+    assert!((log_likelihood(&talk, &[], &map) - after).abs() < 1e-12);
 }
 
 #[test]
@@ -203,11 +205,11 @@ fn another_name_counts_as_the_one_it_means_and_a_forgotten_one_not() {
     let (gym, arena) = (talk.name(0), talk.name(1));
     talk.claim(&map, &[called(0, gym)]);
     talk.claim(&map, &[called(2, arena)]);
-    assert!(log_likelihood(&talk, &map) < 0.0);
+    assert!(log_likelihood(&talk, &[], &map) < 0.0);
     Arc::make_mut(&mut talk.ledger).call(gym, arena, None);
-    assert!(log_likelihood(&talk, &map) > 3.0);
+    assert!(log_likelihood(&talk, &[], &map) > 3.0);
     Arc::make_mut(&mut talk.ledger).forget(gym);
-    assert!(log_likelihood(&talk, &map).abs() < 1e-12);
+    assert!(log_likelihood(&talk, &[], &map).abs() < 1e-12);
 }
 
 #[test]
@@ -216,10 +218,10 @@ fn a_description_weighs_as_the_particle_has_grounded_it_last() {
     let mut talk = Talk::default();
     let gym = talk.name(0);
     let number = talk.claim(&map, &[Claim::Located { said: gym }]);
-    assert!(log_likelihood(&talk, &map).abs() < 1e-12);
+    assert!(log_likelihood(&talk, &[], &map).abs() < 1e-12);
     for ratio in [0.05, 20.0] {
         map.labels.describe(number, gym, ratio);
-        assert!((log_likelihood(&talk, &map) - unless_false(ratio).ln()).abs() < 1e-12);
+        assert!((log_likelihood(&talk, &[], &map) - unless_false(ratio).ln()).abs() < 1e-12);
     }
 }
 
@@ -237,7 +239,7 @@ proptest! {
             for &(group, name, second) in said {
                 talk.claim(&map, &[called(2 * group + u32::from(second), name)]);
             }
-            log_likelihood(&talk, &map)
+            log_likelihood(&talk, &[], &map)
         };
         // By groups, in whatever order these, and within each as said.
         let mut by_group = said.clone();
@@ -257,7 +259,7 @@ proptest! {
             talk.claim(&map, &[if so { called(place, said) } else { Claim::Denied { place, said } }]);
         }
         let standing = talk.standing();
-        let mut fold = Fold::new(&talk, &map, &standing);
+        let mut fold = Fold::new(&talk, Floors::of(&[], &map), &map, &standing);
         for (_, units) in &standing {
             fold.hear(units);
         }
@@ -282,7 +284,7 @@ proptest! {
             for k in if turn { [1, 0] } else { [0, 1] } {
                 talk.claim(&map, &[claims[k]]);
             }
-            log_likelihood(&talk, &map)
+            log_likelihood(&talk, &[], &map)
         };
         prop_assert!((fold(false) - fold(true)).abs() < 0.02);
     }
@@ -299,10 +301,10 @@ proptest! {
         for &(place, name) in &said {
             talk.claim(&map, &[called(place, name)]);
         }
-        let before = log_likelihood(&talk, &map);
+        let before = log_likelihood(&talk, &[], &map);
         // What others call so is rarer by one's own: all weigh anew, but none by more than the bounds.
         talk.claim(&map, &[Claim::Called { place: 3, said: name, again }]);
-        let gain = log_likelihood(&talk, &map) - before;
+        let gain = log_likelihood(&talk, &[], &map) - before;
         prop_assert!(gain > FALSE_TALK.ln() - 1.0 - 0.05 * said.len() as f64 && gain < 5.5, "{gain}");
     }
 }
