@@ -7,6 +7,7 @@ pub mod absence;
 pub mod answer;
 pub mod chance;
 pub mod failure;
+pub mod floors;
 pub mod ghosts;
 pub mod labels;
 pub mod loops;

@@ -171,7 +171,7 @@ impl Particle {
         // A loop may move more poses than an update's budget reaches. What is judged next must see
         // them all where they belong: half of them moved are worse than none.
         if self.belief.pending() {
-            self.belief.settle(structure)?;
+            self.belief.finish(structure)?;
         }
         Ok(())
     }

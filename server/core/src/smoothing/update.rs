@@ -82,6 +82,11 @@ impl Belief {
         self.update_by(structure, Effort::NEWEST, true)
     }
 
+    /// Does what an update's budget left.
+    pub fn finish(&mut self, structure: &Structure) -> Result<Work, SmoothError> {
+        self.update_by(structure, Effort { budget: u64::MAX, ..Effort::USUAL }, true)
+    }
+
     /// Brings all poses to the optimum, whatever it costs.
     pub fn settle(&mut self, structure: &Structure) -> Result<Work, SmoothError> {
         self.update_by(structure, Effort::EXACT, true)

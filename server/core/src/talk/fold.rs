@@ -9,6 +9,7 @@
 //! ```
 
 use crate::edge::Vertex;
+use crate::filter::floors::Floors;
 use crate::filter::labels::LabelId;
 use crate::filter::naming::{
     BASE, BaseMeasure, Near, REACH_M, Site, Support, Tally, share, share_between, unless_false,
@@ -133,44 +134,6 @@ impl Joined {
             tally.concentration() - denied
         };
         BASE + self.names.iter().map(of).sum::<f64>()
-    }
-}
-
-/// The parts of a map that a particle's revisits tie.
-struct Floors {
-    /// Last places of the stretches between parts.
-    ends: Vec<Vertex>,
-    /// By part, what the stretches before it add up to: variance, m².
-    drift_m2: Vec<f64>,
-    /// By part.
-    of: Vec<usize>,
-}
-
-impl Floors {
-    fn of(vague: &[&Stretch], particle: &Particle) -> Self {
-        let ends: Vec<Vertex> = vague.iter().map(|s| s.last).collect();
-        let variance_m2 = |s: &&Stretch| (s.covariance[(0, 0)] + s.covariance[(1, 1)]) / 2.0;
-        let drift_m2 = vague.iter().map(variance_m2).scan(0.0, |sum, m2| {
-            *sum += m2;
-            Some(*sum)
-        });
-        let drift_m2 = std::iter::once(0.0).chain(drift_m2).collect();
-        let mut of: Vec<usize> = (0..=ends.len()).collect();
-        if !ends.is_empty() {
-            let part = |v: Vertex| ends.partition_point(|&end| end <= v);
-            for e in particle.edges.iter() {
-                let (a, b) = (of[part(e.i)], of[part(e.j)]);
-                if a != b {
-                    of.iter_mut().filter(|f| **f == a).for_each(|f| *f = b);
-                }
-            }
-        }
-        Self { ends, drift_m2, of }
-    }
-
-    /// Of a part; one that has no end yet is for itself.
-    fn floor(&self, part: usize) -> usize {
-        self.of.get(part).copied().unwrap_or(part)
     }
 }
 
@@ -331,7 +294,7 @@ impl<'a> Fold<'a> {
         let end = place.saturating_sub(VISITED_BACK).min(belief.len() as Vertex);
         let (mut v, mut nearest_m) = (0, f64::INFINITY);
         while v < end {
-            let part = ends.partition_point(|&end| end <= v);
+            let part = self.floors.part(v);
             if self.floors.floor(part) != here.floor {
                 v = ends.get(part).map_or(end, |&next| next);
                 continue;

@@ -3,7 +3,8 @@
 use crate::geometry::Pose2;
 use crate::smoothing::tests::dense::{Graph, chart};
 use crate::smoothing::tests::script::{Script, Sigma};
-use nalgebra::Matrix3;
+use crate::smoothing::{Belief, Factor, Structure};
+use nalgebra::{Matrix3, Vector3};
 use rand::RngExt;
 use std::f64::consts::PI;
 
@@ -144,4 +145,26 @@ fn a_relocalisation_pulls_a_carried_tour_into_place() {
         assert!(s.smoother.pose(k).distance_m(&s.truth[k as usize]) < 1.5);
     }
     assert!(s.smoother.marginal(newest).amax() < 2.0);
+}
+
+#[test]
+fn a_way_of_hundreds_of_metres_in_the_dark_closes_from_where_it_went() {
+    // To and fro over a yard, by wheels that do not know their turns.
+    let (mut structure, mut belief) = (Structure::new(), Belief::new());
+    let information = Matrix3::from_diagonal(&Vector3::new(400.0, 2500.0, 900.0));
+    let turn = |k: u32| if k % 25 < 6 { 0.5 } else { 0.0 };
+    for k in 0..300 {
+        structure.add_pose(Pose2::new(1.0, 0.0, turn(k)), &information).unwrap();
+        structure.arrange();
+        belief.update(&structure).unwrap();
+    }
+    let went = belief.pose(0).between(&belief.pose(299));
+    let z = went.compose(&Pose2::new(3.0, 25.0, -0.3));
+    let fit = Factor { i: 0, j: 299, i_from_j: z, information: Matrix3::identity() * 1e3 };
+    belief.hold(structure.add_factor(fit).unwrap());
+    structure.arrange();
+    belief.update(&structure).unwrap();
+    assert!(belief.pending());
+    belief.finish(&structure).unwrap();
+    assert!(!belief.pending() && belief.pose(0).between(&belief.pose(299)).distance_m(&z) < 0.1);
 }
