@@ -168,13 +168,14 @@ impl FrontEnd {
             }
         } else if let Some(before) = self.odom_from_body {
             let dt_s = stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9;
+            let stood = self.front_from_body;
             self.predict(&before.between(&odom_from_body), dt_s);
             if !blind && (self.is_dark() || self.is_vague()) {
                 self.land();
                 frozen = self.freeze(self.path_m);
                 self.clear_local();
             } else {
-                self.correct(&sweep);
+                self.correct(&sweep, &stood);
             }
         }
         (self.odom_from_body, self.stamp_ns) = (Some(odom_from_body), stamp_ns);

@@ -11,6 +11,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Largest distance between a point and its surface when registration begins.
 const GATE_M: f32 = 0.6;
+/// Headings farther from where it begins are not found.
+const LEAP_RAD: f64 = 0.35;
 /// Share of a scan's points on known surfaces below which the fit is looked at twice.
 const SHARE_SURE: f64 = 0.6;
 /// Below it the scan says nothing about the pose.
@@ -43,8 +45,9 @@ const HARDLY_REGISTERED: f64 = 0.003;
 const PARTED: [(f64, f64); 2] = [(36.0, 0.003), (100.0, 0.02)];
 
 impl FrontEnd {
-    /// Registers the scan to the local map around the prediction; what it says is fused.
-    pub(crate) fn correct(&mut self, sweep: &Sweep) {
+    /// Registers the scan to the local map around the prediction, or where the body `stood` if wheels moved it that
+    /// nothing fits there; what it says is fused.
+    pub(crate) fn correct(&mut self, sweep: &Sweep, stood: &Pose2) {
         let predicted = self.in_map.covariance(&self.wheels);
         let Some(information) = predicted.try_inverse() else { return };
         let prior = Prior {
@@ -54,7 +57,12 @@ impl FrontEnd {
         };
         let points = thin(&sweep.points, VOXEL_M);
         let moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
-        let Some(found) = self.register(&points, &prior) else {
+        let mut found = self.register(&points, &prior);
+        if found.is_none() || leaps(&stood.between(&self.front_from_body)) {
+            let as_good = |a: &Alignment| found.is_none_or(|f| a.inlier_share >= f.inlier_share);
+            found = self.around(&points, stood).filter(as_good).or(found);
+        }
+        let Some(found) = found else {
             self.doubt(UNREGISTERED);
             return;
         };
@@ -100,26 +108,34 @@ impl FrontEnd {
         best.filter(|b| b.inlier_share >= SHARE_MIN)
     }
 
+    /// Where in the local map, from a place and any heading, the points surely fit.
+    fn around(&mut self, points: &[Point], here: &Pose2) -> Option<Alignment> {
+        let wide = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
+        let local = self.local();
+        let from = |k: i32| {
+            let guess = here.compose(&Pose2::new(0.0, 0.0, f64::from(k) * 0.35));
+            let prior = Prior { target_from_source: guess, information: wide, where_weak: 1.0 };
+            align(points, local, &guess, Some(&prior), GATE_M)
+        };
+        let best = (0..18).filter_map(from).max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
+        best.filter(|b| b.inlier_share >= SHARE_SURE)
+    }
+
     /// After a break too short for the robot to have been carried off: where in the local map is it
     /// now, whatever its odometry says?
     pub(crate) fn resume(&mut self, sweep: &Sweep) -> bool {
-        let points = thin(&sweep.points, VOXEL_M);
-        let wide = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
         let here = self.front_from_body;
-        let local = self.local();
-        let found = (0..18)
-            .filter_map(|k| {
-                let guess = here.compose(&Pose2::new(0.0, 0.0, f64::from(k) * 0.35));
-                let prior = Prior { target_from_source: guess, information: wide, where_weak: 1.0 };
-                align(&points, local, &guess, Some(&prior), GATE_M)
-            })
-            .max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
-        let Some(found) = found.filter(|f| f.inlier_share >= SHARE_SURE) else { return false };
+        let Some(found) = self.around(&thin(&sweep.points, VOXEL_M), &here) else { return false };
         self.front_from_body = found.target_from_source;
         self.wheels.lift();
         self.doubt(RESUMED);
         true
     }
+}
+
+/// Whether a step of the wheels is more than a registration from its end sees through.
+fn leaps(step: &Pose2) -> bool {
+    step.yaw_rad.abs() > LEAP_RAD || step.x_m.hypot(step.y_m) > f64::from(GATE_M)
 }
 
 /// φ by how far scans and wheels part, distance²: of what a few standard deviations explain, nothing.

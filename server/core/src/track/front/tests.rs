@@ -1,6 +1,7 @@
 use super::*;
 use crate::event::{Laser, Scan};
 use crate::scan::sweep::sweep;
+use std::f64::consts::PI;
 
 /// What a laser sees of an 8 × 6 m room with a pillar, or nothing at all.
 fn seen(body: &Pose2, blind: bool) -> Sweep {
@@ -95,6 +96,30 @@ fn spoilt(path: &[Pose2], spoil: impl Fn(usize, Pose2) -> Pose2) -> Vec<Pose2> {
         all.push(odom);
     }
     all
+}
+
+/// Wheels that make one step which the robot doesn't; the last pose.
+fn slipped(step: Pose2) -> (Pose2, FrontEnd) {
+    let mut front = FrontEnd::new(1.0);
+    let mut last = Pose2::default();
+    for k in 0..40_i64 {
+        last = Pose2::new(-3.0 + 0.1 * k as f64, -1.0, 0.0);
+        let here = Pose2::new(-1.0, -1.0, 0.0);
+        let odom = if k < 20 { last } else { here.compose(&step).compose(&here.between(&last)) };
+        front.scan(k * 200_000_000, odom, seen(&last, false));
+    }
+    (last, front)
+}
+
+#[test]
+fn a_step_that_only_wheels_make_is_none() {
+    for step in [Pose2::new(0.0, 0.0, 1.0), Pose2::new(0.0, 0.0, PI / 2.0), Pose2::new(1.0, 0.0, 0.0)] {
+        let (last, front) = slipped(step);
+        let went = front.front_from_body();
+        let off_m = went.distance_m(&Pose2::new(-3.0, -1.0, 0.0).between(&last));
+        assert!(off_m < 0.05 && went.yaw_rad.abs() < 0.02, "{step:?}: {went:?}");
+        assert!(front.open_places().any(|p| p.chain.failed > 0.01), "scans and wheels part");
+    }
 }
 
 #[test]
