@@ -69,8 +69,9 @@ pub fn drive(y_m: f64, x_m: f64) -> Vec<Pose2> {
     poses
 }
 
-/// The drive's events: in the yard the laser sees nothing, and wheels slip by some per cent either way.
-pub fn events(poses: &[Pose2]) -> Vec<Event> {
+/// The drive's events: in the yard the laser sees nothing, and wheels slip by such a share at most, either way, for
+/// eight metres at a time.
+pub fn events(poses: &[Pose2], most: f64) -> Vec<Event> {
     let laser = Laser { range_max_m: 6.0, ..laser() };
     let walls: Vec<[f64; 4]> = [hall(0.0, true), hall(APART_M, false)].concat();
     let mut events = vec![Event::Setup(Setup { robot: "r".into(), lasers: vec![laser.clone()] })];
@@ -79,7 +80,7 @@ pub fn events(poses: &[Pose2]) -> Vec<Event> {
         let stamp_ns = k as i64 * 200_000_000;
         if let Some(before) = k.checked_sub(1) {
             let step = poses[before].between(pose);
-            let slip = 0.1 * ((k / 40 * 7919 % 13) as f64 / 6.0 - 1.0);
+            let slip = most * ((k / 40 * 7919 % 13) as f64 / 6.0 - 1.0);
             let yaw_rad = step.yaw_rad * (1.0 + slip) + 0.05 * slip * step.x_m;
             odom = odom.compose(&Pose2::new(step.x_m * (1.0 + slip), step.y_m, yaw_rad));
         }
@@ -96,7 +97,7 @@ pub fn events(poses: &[Pose2]) -> Vec<Event> {
 /// Weights of the graphs after a drive, best first.
 fn weights(y_m: f64, x_m: f64) -> Vec<f64> {
     let mut mapper = Mapper::new(Config::default());
-    run(&mut mapper, &events(&drive(y_m, x_m)));
+    run(&mut mapper, &events(&drive(y_m, x_m), 0.1));
     mapper.step(Event::Flush);
     mapper.snapshot().graph().particles.iter().map(|p| p.weight).collect()
 }

@@ -27,7 +27,7 @@ fn who_maps_steadily_is_mapping_however_far_from_the_start() {
 fn in_the_dark_doubt_grows_until_the_robot_is_lost() {
     let poses = alike::drive(0.0, 8.0);
     let mut mapper = Mapper::new(Config::default());
-    let mut all = alike::events(&poses);
+    let mut all = alike::events(&poses, 0.3);
     all.insert(20, Event::Utterance(say("u", "this is the kitchen", 0)));
     // Setup, the sentence, and two for each pose: the yard ends 8 m before the last.
     let effects = run(&mut mapper, &all[..all.len() - 90]);
