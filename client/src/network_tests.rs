@@ -259,15 +259,15 @@ async fn a_planner_asks_again_while_the_server_is_busy_and_tells_refusals() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_question_nobody_answers_ends() {
     let (router, locator) = router().await;
+    // Declared before the session opens: it may not hear of it in time otherwise.
+    let (sender, _held) = unbounded_channel();
+    let hold = move |query: zenoh::query::Query| drop(sender.send(query));
+    router.declare_queryable("held").callback(hold).background().await.unwrap();
     let session = open(&locator).await.unwrap();
     let short = Duration::from_millis(200);
     let planner = Planner::new(&session, "elsewhere", "main", short).unwrap();
     let nobody = planner.labels().await.unwrap_err();
     assert!(matches!(nobody, ClientError::NoServer { .. }), "{nobody}");
-
-    let (sender, _held) = unbounded_channel();
-    let hold = move |query: zenoh::query::Query| drop(sender.send(query));
-    router.declare_queryable("held").callback(hold).background().await.unwrap();
     let late = ask::<Ack>(&session, "held", "", short).await.unwrap_err();
     assert!(matches!(late, ClientError::Timeout { .. }), "{late}");
 }
