@@ -11,7 +11,7 @@ use crate::filter::Filter;
 use crate::filter::loops::Measured;
 use crate::filter::particle::Particle;
 use crate::geometry::{Pose2, wrap};
-use crate::graph::Graph;
+use crate::graph::{Graph, stretches};
 use crate::mapper::standing::Standing;
 use crate::smoothing::SmoothError;
 use crate::talk::{Here, Talk};
@@ -277,7 +277,7 @@ impl Mapper {
             }
         }
         let ends = stretches.ends();
-        let part = (0..places.len() + open.len()).map(|v| ends.partition_point(|&end| end as usize <= v));
+        let part = (0..places.len() + open.len()).map(|v| stretches::part(&ends, v as Vertex));
         (part.collect(), unseen.windows(2).map(|w| w[0] || w[1]).collect())
     }
 

@@ -3,7 +3,7 @@
 
 use crate::edge::Vertex;
 use crate::filter::particle::Particle;
-use crate::graph::stretches::Stretch;
+use crate::graph::stretches::{self, Stretch};
 
 /// The parts of a map, and which of them a particle's revisits tie.
 #[derive(Clone, Debug)]
@@ -28,7 +28,7 @@ impl Floors {
         let drift_m2 = std::iter::once(0.0).chain(drift_m2).collect();
         let mut of: Vec<usize> = (0..=ends.len()).collect();
         if !ends.is_empty() {
-            let part = |v: Vertex| part_of(&ends, v);
+            let part = |v: Vertex| stretches::part(&ends, v);
             for e in particle.edges.iter() {
                 let (a, b) = (of[part(e.i)], of[part(e.j)]);
                 if a != b {
@@ -46,10 +46,6 @@ impl Floors {
 
     /// The part that a place is in.
     pub fn part(&self, v: Vertex) -> usize {
-        part_of(&self.ends, v)
+        stretches::part(&self.ends, v)
     }
-}
-
-fn part_of(ends: &[Vertex], v: Vertex) -> usize {
-    ends.partition_point(|&end| end <= v)
 }

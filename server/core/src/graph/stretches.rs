@@ -59,6 +59,11 @@ impl Stretches {
     }
 }
 
+/// The part of the map that a place is in, by the ends of the stretches between parts.
+pub fn part(ends: &[Vertex], v: Vertex) -> usize {
+    ends.partition_point(|&end| end <= v)
+}
+
 /// A covariance over one more edge of the chain.
 pub fn carried(covariance: &Matrix3<f64>, chain: &Chain) -> Matrix3<f64> {
     let f = chain.previous_from_this.inverse().adjoint();

@@ -4,6 +4,7 @@ use crate::edge::Vertex;
 use crate::filter::labels::LabelId;
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
+use crate::graph::stretches;
 use crate::language::act::Sameness;
 use crate::talk::Here;
 use serde::{Deserialize, Serialize};
@@ -148,7 +149,7 @@ impl Testimonies {
     pub fn part(&self, particle: &Particle, ends: &[Vertex], v: Vertex) -> usize {
         match self.ahead.get(&v) {
             Some(ahead) if (v as usize) >= particle.belief.len() => ahead.part,
-            _ => ends.partition_point(|&end| end <= v),
+            _ => stretches::part(ends, v),
         }
     }
 

@@ -36,7 +36,7 @@ pub struct Here<'a> {
     pub poses: &'a (dyn Fn(&Particle) -> Vec<Pose2> + Sync),
     /// Path travelled up to each place, metres.
     pub path_m: Vec<f64>,
-    /// Of each place, in how many parts the path before it falls, see [`crate::graph::stretches`].
+    /// Of each place, which part of the map it is in, see [`crate::graph::stretches::part`].
     pub part: Vec<usize>,
     /// Of each place, whether the robot sees nothing there, or soon after.
     pub dark: Vec<bool>,
