@@ -101,7 +101,7 @@ fn chained(graph: &Graph, from: usize, to: usize) -> Option<(Pose2, Matrix3<f64>
 }
 
 /// Places without loops, and where those are that were seen.
-fn mapped(played: &Played, dark_s: &[(f64, f64)]) -> (Graph, Vec<Option<Pose2>>) {
+pub fn mapped(played: &Played, dark_s: &[(f64, f64)]) -> (Graph, Vec<Option<Pose2>>) {
     let mut mapper = Mapper::new(Config { particles: 1, loops: false, ..Config::default() });
     let mut placed: Vec<Vec<Pose2>> = Vec::new();
     for message in &played.stream {
@@ -155,7 +155,7 @@ fn blinded_s(played: &Played) -> Vec<(f64, f64)> {
     BLINDED_M.iter().filter_map(|&(from, to)| Some((when(from)?, when(to)?))).collect()
 }
 
-fn pose(p: &toponym_proto::Pose) -> Pose2 {
+pub fn pose(p: &toponym_proto::Pose) -> Pose2 {
     Pose2::new(p.x_m, p.y_m, p.yaw_rad)
 }
 

@@ -5,16 +5,19 @@
 //! cargo run --release -p toponym-server --example drives -- chance drives/*
 //! cargo run --release -p toponym-server --example drives -- coverage drives/*
 //! cargo run --release -p toponym-server --example drives -- dark --seeds 20
+//! cargo run --release -p toponym-server --example drives -- absence --seeds 20
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
 //! shows on buildings not learned from how often fits are true that are called so with some probability.
 //! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
-//! `dark` plays the simulator's tours itself and shows what the chain is worth over dark stretches.
+//! `dark` plays the simulator's tours itself and shows what the chain is worth over dark stretches; `absence` learns
+//! by them how often places contradict each other in right maps and in wrong ones (`CONTRADICTED` in `absence.rs`).
 //!
 //! A drive is a folder with `sim.rec` and `truth.json`, as `toponym simulate` makes them. Any log will do:
 //! `toponym-server serve --record` makes the one, `trajectory` rows `[t, x, y, yaw]` are the other.
 #![allow(clippy::unwrap_used, reason = "a tool: a wrong file ends it")]
 
+mod absence;
 mod chance;
 mod coverage;
 mod dark;
@@ -48,6 +51,12 @@ enum What {
         #[arg(required = true)]
         drives: Vec<PathBuf>,
     },
+    /// How places contradict each other in right maps and in wrong ones.
+    Absence {
+        /// How many seeds; the first is 1001.
+        #[arg(long, default_value_t = 20)]
+        seeds: u64,
+    },
     /// Errors of the chain over dark stretches, and what it claims.
     Dark {
         /// Kinds of tours, or how they begin; none: all of them.
@@ -68,6 +77,7 @@ fn main() {
             chance::report(&drives);
         }
         What::Coverage { drives } => drives.iter().for_each(|d| coverage::report(&Drive::read(d))),
+        What::Absence { seeds } => absence::report(1001..1001 + seeds),
         What::Dark { kinds, seeds, each } => dark::report(&kinds, 1..seeds + 1, each),
     }
 }

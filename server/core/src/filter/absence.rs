@@ -1,25 +1,29 @@
-//! Step 4 where nothing was found: the detector's other outcome, eqs. (17–18).
+//! Step 4 where a graph expects something: the detector's other outcome, eqs. (17–18).
 //!
-//! A graph that lays the newest place over an older one expects the two to look alike. Where a pair was looked
-//! at and does not, or looks alike elsewhere only, it weighs by
+//! A graph that lays the newest place over an older one expects the two to look alike. If it knows how they lie,
+//! their scans are compared as they lie, and what share c of the compared points contradict weighs by
+//!
+//! ```text
+//! p(c | right) / p(c | wrong) = κ + (1 − κ) · min(1, (c / c₀)^−w)
+//! ```
+//!
+//! c₀ what contradicts in right maps, too, κ for what was moved between two visits. What agrees is no evidence: a copy agrees, too. If it does not know,
+//! places that were looked at and do not look alike, or elsewhere only, weigh by
 //!
 //! ```text
 //! p(no fit | G) / p(no fit | new ground) = 1 − p_D · ō,    ō = P(the two overlap) under x⁻
 //! ```
 //!
-//! and one that expects nothing there by 1. Pairs are the same for all particles; one that nobody looked at
+//! and a graph that expects nothing there by 1. Pairs are the same for all particles; one that nobody looked at
 //! says nothing. Neighbouring places show the same walls: floors are paid for once.
 
 use crate::edge::Vertex;
-use crate::filter::loops::SCORE_MIN;
 use crate::filter::particle::Particle;
-use crate::filter::propose::SPREAD_M;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
-use crate::scan::agree::agreement;
+use crate::scan::agree::{Agreement, agreement};
 use crate::scan::view::Closeness;
 use crate::smoothing::{Relative, Structure};
-use crate::track::front::LOCAL_PATH_M;
 use libm::erf;
 
 /// p_D of a single pair within [`OVERLAP_M`] of each other, by the search.
@@ -33,14 +37,16 @@ const EXPECTED_M: f64 = 0.5;
 const EXPECTED_RAD: f64 = 0.1;
 /// So many standard deviations of the spread.
 const SIGMAS: f64 = 3.0;
-/// c₁ and c₀: how often places contradict each other that lie so, and that do not.
-const CONTRADICTS: (f64, f64) = (0.04, 0.6);
-/// Older places compared, so near in the map.
-const COMPARED_MAX: usize = 3;
-const COMPARED_M: f64 = 5.0;
-/// How certain the relative pose must be for that.
-const COMPARED_SIGMA_MAX_M: f64 = 0.3;
-const COMPARED_SIGMA_MAX_RAD: f64 = 0.05;
+/// c₀ and w: learned by `--example drives -- absence` of the server from simulated tours, in right maps of them and
+/// in wrong ones.
+pub const CONTRADICTED: (f64, f64) = (0.1, 5.5);
+/// κ: of looks at a place that is known so many find something moved, a door or a table.
+const MOVED: f64 = 0.02;
+/// How certain the relative pose must be for that …
+const SURE_SIGMA_M: f64 = 0.3;
+const SURE_SIGMA_RAD: f64 = 0.05;
+/// … and how likely that the two overlap.
+const SURE_OVERLAP: f64 = 0.5;
 /// Points that must be seen or seen through for an outcome.
 const COMPARED_MIN: u32 = 20;
 /// Places along the path that are farther apart are of two floors, which either is expected to be found, metres.
@@ -61,15 +67,14 @@ pub fn pay(
     if particle.missed_at_m.is_some_and(|at_m| path_m - at_m < SAME_WALLS_M) {
         return 0.0;
     }
-    let log = log_missed(graph, structure, particle, t, looked)
-        .min(log_contradicted(graph, structure, particle, t));
+    let log = log_expected(graph, structure, particle, t, looked);
     if log < -0.1 {
         particle.missed_at_m = Some(path_m);
     }
     log
 }
 
-fn log_missed(
+fn log_expected(
     graph: &Graph,
     structure: &Structure,
     particle: &Particle,
@@ -85,11 +90,39 @@ fn log_missed(
     let Ok(mut predicted) = particle.belief.relative(structure, t, &pairs) else { return 0.0 };
     predicted.sort_by_key(|r| r.i);
     let floors = predicted.chunk_by(|a, b| !graph.apart(a.i, b.i, FLOOR_M));
-    floors.map(|floor| log_missed_of(floor, looked)).sum()
+    let of = |floor: &[Relative]| match contradicted(graph, t, floor) {
+        Some(share) => log_contradicted(share),
+        None => log_missed(floor, looked),
+    };
+    floors.map(of).sum()
+}
+
+/// log p(c | right) / p(c | wrong).
+fn log_contradicted(share: f64) -> f64 {
+    let (usual, power) = CONTRADICTED;
+    (MOVED + (1.0 - MOVED) * (share / usual).max(1.0).powf(-power)).ln()
+}
+
+/// The share of points that contradict where a map lays place `t` for certain over places of one floor, by the
+/// pair that sees most of each other; 0 if they see nothing of each other. None: it is not certain.
+pub fn contradicted(graph: &Graph, t: Vertex, floor: &[Relative]) -> Option<f64> {
+    let is_sure = |r: &&Relative| {
+        r.sigma_m() < SURE_SIGMA_M && r.sigma_rad() < SURE_SIGMA_RAD && p_overlap(r) > SURE_OVERLAP
+    };
+    let compare = |r: &Relative| {
+        let look = Closeness {
+            tolerance_m: Closeness::CLOSE.tolerance_m + 2.0 * r.sigma_m(),
+            tolerance_per_m: Closeness::CLOSE.tolerance_per_m + 2.0 * r.sigma_rad(),
+            ..Closeness::CLOSE
+        };
+        agreement(&graph.place(r.i).content, &graph.place(t).content, &r.i_from_a, &look)
+    };
+    let best = floor.iter().filter(is_sure).map(compare).max_by_key(Agreement::compared)?;
+    Some(if best.compared() < COMPARED_MIN { 0.0 } else { 1.0 - best.score() })
 }
 
 /// Of the places of one floor: some found is found.
-fn log_missed_of(floor: &[Relative], looked: &[(Vertex, Vec<Pose2>)]) -> f64 {
+fn log_missed(floor: &[Relative], looked: &[(Vertex, Vec<Pose2>)]) -> f64 {
     let found = |r: &&Relative| {
         let of = looked.iter().filter(|(i, _)| *i == r.i).flat_map(|(_, modes)| modes);
         p_overlap(r) > 0.01 && of.into_iter().any(|z| is_expected(r, z))
@@ -98,43 +131,6 @@ fn log_missed_of(floor: &[Relative], looked: &[(Vertex, Vec<Pose2>)]) -> f64 {
         return 0.0;
     }
     (1.0 - FOUND * floor.iter().map(p_overlap).fold(0.0, f64::max)).ln()
-}
-
-/// log c₁/c₀ if the scans contradict where the particle is certain that places lie over one another, else 0.
-fn log_contradicted(graph: &Graph, structure: &Structure, particle: &Particle, t: Vertex) -> f64 {
-    let near = nearest(graph, t, |v| particle.belief.pose(v));
-    let Ok(predicted) = particle.belief.relative(structure, t, &near) else { return 0.0 };
-    let contradicts = |r: &Relative| {
-        let (sigma_m, sigma_rad) = (r.sigma_m(), r.sigma_rad());
-        if sigma_m > COMPARED_SIGMA_MAX_M || sigma_rad > COMPARED_SIGMA_MAX_RAD {
-            return false;
-        }
-        let look = Closeness {
-            tolerance_m: Closeness::CLOSE.tolerance_m + 2.0 * sigma_m,
-            tolerance_per_m: Closeness::CLOSE.tolerance_per_m + 2.0 * sigma_rad,
-            ..Closeness::BRIEF
-        };
-        let both = agreement(&graph.place(r.i).content, &graph.place(t).content, &r.i_from_a, &look);
-        both.agree + both.conflict >= COMPARED_MIN && both.score() < SCORE_MIN
-    };
-    if predicted.iter().any(contradicts) { (CONTRADICTS.0 / CONTRADICTS.1).ln() } else { 0.0 }
-}
-
-/// The older places nearest to place `t` in a map, spread along the path.
-fn nearest(graph: &Graph, t: Vertex, pose: impl Fn(Vertex) -> Pose2) -> Vec<Vertex> {
-    let here = pose(t);
-    let mut near: Vec<(f64, Vertex)> = (0..t)
-        .map(|i| (pose(i).distance_m(&here), i))
-        .filter(|&(d, i)| d < COMPARED_M && graph.apart(i, t, LOCAL_PATH_M))
-        .collect();
-    near.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-    let mut chosen: Vec<Vertex> = Vec::with_capacity(COMPARED_MAX);
-    for (_, i) in near {
-        if chosen.len() < COMPARED_MAX && chosen.iter().all(|&c| graph.apart(c, i, SPREAD_M)) {
-            chosen.push(i);
-        }
-    }
-    chosen
 }
 
 /// P(o): that the two places lie within [`OVERLAP_M`] of each other along either axis.
@@ -169,6 +165,13 @@ mod tests {
         assert!(p_overlap(&at(0.5, 0.1)) > 0.99 && p_overlap(&at(5.0, 0.1)) < 0.01);
         // Two sides of 4 m in a spread of 10 m: .159² by the table of the normal.
         assert!((p_overlap(&at(0.0, 10.0)) - 0.1585_f64.powi(2)).abs() < 1e-3);
+    }
+
+    #[test]
+    fn what_agrees_is_no_evidence_and_what_contradicts_may_have_been_moved() {
+        assert!(log_contradicted(0.0).abs() < 1e-12 && log_contradicted(0.03).abs() < 1e-12);
+        assert!(log_contradicted(0.15) < -1.0);
+        assert!((log_contradicted(0.9) - MOVED.ln()).abs() < 0.1);
     }
 
     #[test]

@@ -72,6 +72,19 @@ impl Ghosts {
         }
     }
 
+    /// A fit of a question to which the best graph says "elsewhere" was seen, and weighs so much for "there": of all
+    /// fits of a question the likeliest is what the answer is worth.
+    pub fn see(&mut self, edge: &Edge, log_there: f64, log_words: f64) {
+        let known = self.ghosts.iter_mut().find(|g| g.there && g.edge.question == edge.question);
+        if known.as_ref().is_none_or(|g| g.log_odds < log_there) && log_there > FORGOTTEN.ln() {
+            let ghost = Ghost { edge: edge.clone(), there: true, log_odds: log_there, since: 0.0, log_words };
+            match known {
+                Some(g) => *g = ghost,
+                None => self.drop_answer(ghost),
+            }
+        }
+    }
+
     /// The kept graphs gained so much, or paid, for where they lay the newest places: graphs that held those
     /// elsewhere did neither.
     pub fn kept_gained(&mut self, log_gain: f64) {

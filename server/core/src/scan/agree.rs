@@ -25,9 +25,14 @@ pub struct Agreement {
 }
 
 impl Agreement {
+    /// Points that the other place saw or saw through.
+    pub fn compared(&self) -> u32 {
+        self.agree + self.conflict
+    }
+
     /// Share of the compared points that agree, in [0, 1]; 0 if nothing could be compared.
     pub fn score(&self) -> f64 {
-        f64::from(self.agree) / f64::from((self.agree + self.conflict).max(1))
+        f64::from(self.agree) / f64::from(self.compared().max(1))
     }
 
     /// How much speaks for the two being one: what agrees less several times what conflicts, per
