@@ -28,8 +28,8 @@ pub const BASE: f64 = 0.2;
 const DOUBT: f64 = FALSE_TALK / (1.0 - FALSE_TALK);
 /// Names people may use of a place before any was said: the size of the lexicon, about.
 const NAMES: f64 = 150.0;
-/// So many of them are what a way is called: every building has hallways, and one is called like the other.
-const WAYS: f64 = 20.0;
+/// The same of ways: a hallway is called a hallway wherever it is.
+const NAMES_OF_WAYS: f64 = 2.0;
 /// How near two places are for what is said of one to be expected of the other: standard deviation
 /// of a Gaussian kernel, the size of a room.
 const JOINED_M: f64 = 3.0;
@@ -194,40 +194,47 @@ impl Spoken {
     }
 }
 
-/// p₀: how often a name is said of anything.
+/// p₀: how often a name is said of anything of its class. Names of ways and of rooms are no rivals: who stands in
+/// a door says either.
 #[derive(Clone, Debug, Default)]
 pub struct BaseMeasure {
     /// Utterances by name.
     times: Vec<f64>,
-    all: f64,
-    /// Names said or that might be.
-    names: f64,
+    /// Which names are those of ways.
+    ways: Vec<bool>,
+    /// Utterances of either class, and names said or that might be.
+    all: [f64; 2],
+    names: [f64; 2],
 }
 
 impl BaseMeasure {
-    /// Of so many names in the ledger, none said yet.
-    pub fn new(names: usize) -> Self {
-        Self { times: vec![0.0; names], all: 0.0, names: NAMES.max(names as f64 + 1.0) }
+    /// Of the names in the ledger, each of a way or not, none said yet.
+    pub fn new(ways: Vec<bool>) -> Self {
+        let of_ways = ways.iter().filter(|w| **w).count() as f64;
+        let of_rooms = ways.len() as f64 - of_ways;
+        let names = [NAMES.max(of_rooms + 1.0), NAMES_OF_WAYS.max(of_ways + 1.0)];
+        Self { times: vec![0.0; ways.len()], ways, all: [0.0; 2], names }
     }
 
-    /// A name is one of ways.
-    pub fn is_of_ways(&mut self, label: LabelId) {
-        self.times[label as usize] += WAYS;
-        self.all += WAYS;
+    /// Whether a name is that of a way.
+    pub fn is_way(&self, label: LabelId) -> bool {
+        self.ways.get(label as usize).copied().unwrap_or(false)
     }
 
     /// A name was said, with a probability.
     pub fn count(&mut self, label: LabelId, units: f64) {
         self.times[label as usize] += units;
-        self.all += units;
+        self.all[usize::from(self.is_way(label))] += units;
     }
 
     /// p₀(l) by all other sentences than one that said some names itself.
     pub fn probability(&self, label: LabelId, itself: &[(LabelId, f64)]) -> f64 {
-        let own = itself.iter().filter(|o| o.0 == label).map(|o| o.1).sum::<f64>();
-        let times = self.times.get(label as usize).copied().unwrap_or(0.0);
-        let all = self.all - itself.iter().map(|o| o.1).sum::<f64>();
-        ((times - own).max(0.0) + 1.0) / (all.max(0.0) + self.names)
+        let is_way = self.is_way(label);
+        let own = |of: &dyn Fn(LabelId) -> bool| itself.iter().filter(|o| of(o.0)).map(|o| o.1).sum::<f64>();
+        let times = self.times.get(label as usize).copied().unwrap_or(0.0) - own(&|l| l == label);
+        let class = usize::from(is_way);
+        let all = self.all[class] - own(&|l| self.is_way(l) == is_way);
+        (times.max(0.0) + 1.0) / (all.max(0.0) + self.names[class])
     }
 }
 
@@ -256,8 +263,8 @@ mod tests {
 
     #[test]
     fn base_rates_sum_to_one_over_what_may_be_said() {
-        let mut base = BaseMeasure::new(3);
-        for (label, units) in [(0, 1.0), (0, 0.5), (2, 1.0)] {
+        let mut base = BaseMeasure::new(vec![false, false, false, true]);
+        for (label, units) in [(0, 1.0), (0, 0.5), (2, 1.0), (3, 4.0)] {
             base.count(label, units);
         }
         for own in [&[][..], &[(0, 0.5)]] {
@@ -266,5 +273,6 @@ mod tests {
                 + (NAMES - 3.0) * base.probability(99, own);
             assert!((sum - 1.0).abs() < 1e-12);
         }
+        assert!(base.probability(3, &[]) > 0.5, "a hallway is called so");
     }
 }

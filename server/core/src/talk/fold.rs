@@ -125,15 +125,15 @@ impl Joined {
         known.add(tally, share);
     }
 
-    /// Σ_k (α_k + α₀ p₀(k) f_k).
-    fn total(&self, p0: impl Fn(LabelId) -> f64) -> f64 {
+    /// Σ_k (α_k + α₀ p₀(k) f_k) over the names of one class.
+    fn total(&self, is_of_class: impl Fn(LabelId) -> bool, p0: impl Fn(LabelId) -> f64) -> f64 {
         let of = |&label: &LabelId| {
             let tally = self.of[label as usize];
             let left = tally.left();
             let denied = if left < 1.0 { BASE * p0(label) * (1.0 - left) } else { 0.0 };
             tally.concentration() - denied
         };
-        BASE + self.names.iter().map(of).sum::<f64>()
+        BASE + self.names.iter().filter(|&&label| is_of_class(label)).map(of).sum::<f64>()
     }
 }
 
@@ -160,8 +160,7 @@ impl<'a> Fold<'a> {
         standing: &[(&Testimony, Vec<Units>)],
     ) -> Self {
         let names = talk.ledger.names().len();
-        let mut base = BaseMeasure::new(names);
-        (0..names as LabelId).filter(|&label| talk.is_way(label)).for_each(|label| base.is_of_ways(label));
+        let mut base = BaseMeasure::new((0..names as LabelId).map(|label| talk.is_way(label)).collect());
         let (mut numbers, mut sites) = (BTreeMap::new(), Vec::new());
         for units in standing.iter().flat_map(|(_, units)| units) {
             base.count(units.label, units.tally.said);
@@ -239,16 +238,18 @@ impl<'a> Fold<'a> {
         let (base, joined) = (&self.base, &self.joined);
         let p0 = |l: LabelId| base.probability(l, own);
         let tally = joined.of[label as usize];
+        let is_way = base.is_way(label);
+        let total = joined.total(|l| base.is_way(l) == is_way, p0);
         match again {
             Sameness::Open => {
                 let predicted = tally.concentration() + BASE * p0(label) * tally.left();
-                unless_false(predicted / joined.total(p0) / p0(label))
+                unless_false(predicted / total / p0(label))
             }
             // "Back in the lobby": it was called so before.
             Sameness::Same => {
-                let called_so = tally.concentration() / joined.total(p0) / p0(label);
-                let open = called_so + BASE * tally.left() / joined.total(p0);
-                let kind = OF_ITS_KIND[usize::from(!self.talk.is_way(label))];
+                let called_so = tally.concentration() / total / p0(label);
+                let open = called_so + BASE * tally.left() / total;
+                let kind = OF_ITS_KIND[usize::from(!is_way)];
                 unless_false(kind * open + (1.0 - kind) * called_so)
             }
             // "Another lobby": it was not.
