@@ -20,7 +20,7 @@ use crate::language::Name;
 use crate::language::act::Sameness;
 use crate::talk::Talk;
 use crate::talk::claims::{Claim, Claims, Testimony};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// How often two places spoken of lie in one room by chance: a room of some floor.
 const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
@@ -28,6 +28,8 @@ const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
 const OF_ITS_KIND: [f64; 2] = [0.9, 0.3];
 /// How often a place has been seen before when somebody speaks of it.
 const VISITED_BY_CHANCE: f64 = 0.3;
+/// Who comes back over floor that was talked about introduces so much less than on new floor.
+const INTRODUCED_AGAIN: f64 = 0.5;
 /// Places so far back along the path are no visit before.
 const VISITED_BACK: Vertex = 12;
 /// Two successive places are hardly farther apart.
@@ -41,8 +43,8 @@ pub fn log_likelihood(talk: &Talk, vague: &[&Stretch], particle: &Particle) -> f
     }
     let mut fold = Fold::new(talk, Floors::of(vague, particle), particle, &standing);
     let log_ratios = standing.iter().map(|(t, units)| {
-        let ratio = fold.ratio(t, units);
-        fold.hear(units);
+        let ratio = fold.ratio(t, units) * fold.introduced(t);
+        fold.hear(t, units);
         ratio.ln()
     });
     log_ratios.sum()
@@ -72,6 +74,13 @@ impl Talk {
     fn meant(&self, utterance: u32, said: LabelId) -> Option<LabelId> {
         let label = self.ledger.meant(said);
         self.ledger.speaks_of(utterance, label).then_some(label)
+    }
+
+    /// Names of rooms that an utterance speaks of.
+    fn names(&self, testimony: &Testimony) -> impl Iterator<Item = LabelId> {
+        let claims = testimony.readings.iter().flat_map(|r| &r.claims);
+        let said = claims.filter_map(|(_, claim)| claim.name());
+        said.filter_map(|said| self.meant(testimony.utterance, said)).filter(|&label| !self.is_way(label))
     }
 
     fn units(&self, testimony: &Testimony) -> Vec<Units> {
@@ -149,6 +158,8 @@ struct Fold<'a> {
     /// What was said of each site so far.
     told: Vec<Vec<(LabelId, Tally)>>,
     joined: Joined,
+    /// Names that were spoken of so far.
+    mentioned: BTreeSet<LabelId>,
 }
 
 impl<'a> Fold<'a> {
@@ -181,10 +192,12 @@ impl<'a> Fold<'a> {
             near: Near::new(sites),
             told,
             joined: Joined::of(names),
+            mentioned: BTreeSet::new(),
         }
     }
 
-    fn hear(&mut self, units: &[Units]) {
+    fn hear(&mut self, testimony: &Testimony, units: &[Units]) {
+        self.mentioned.extend(self.talk.names(testimony));
         for Units { place, label, tally } in units {
             let Some(&site) = self.numbers.get(place) else { continue };
             if self.told[site].is_empty() {
@@ -210,6 +223,18 @@ impl<'a> Fold<'a> {
             rest -= weight;
         }
         ratio + rest.max(0.0)
+    }
+
+    /// Names that nobody spoke of before are for floor where nobody was before.
+    fn introduced(&self, testimony: &Testimony) -> f64 {
+        let is_first = self.mentioned.is_empty();
+        let held = self.talk.ledger.entries()[testimony.utterance as usize].held;
+        if is_first || self.talk.names(testimony).all(|label| self.mentioned.contains(&label)) {
+            return 1.0;
+        }
+        let Some(here) = site(self.talk, &self.floors, self.particle, held) else { return 1.0 };
+        let known = share(self.nearest_m(held, &here));
+        1.0 - known * (1.0 - INTRODUCED_AGAIN)
     }
 
     fn of_claim(&mut self, utterance: u32, claim: Claim, own: &[(LabelId, f64)]) -> f64 {

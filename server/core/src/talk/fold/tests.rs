@@ -30,14 +30,23 @@ impl Talk {
         self.claim_by(best, vec![(1.0, claims.iter().map(|&c| (1.0, c)).collect())])
     }
 
+    /// The same, said at a place.
+    fn claim_from(&mut self, best: &Particle, held: Vertex, claims: &[Claim]) -> u32 {
+        self.claim_at(best, held, vec![(1.0, claims.iter().map(|&c| (1.0, c)).collect())])
+    }
+
     fn claim_by(&mut self, best: &Particle, readings: Vec<(f64, Vec<(f64, Claim)>)>) -> u32 {
+        self.claim_at(best, 0, readings)
+    }
+
+    fn claim_at(&mut self, best: &Particle, held: Vertex, readings: Vec<(f64, Vec<(f64, Claim)>)>) -> u32 {
         let number = self.ledger.entries().len() as u32;
         let entry = Entry {
             id: number.to_string(),
             stamp_ns: 0,
             text: String::new(),
             parse: Parse::default(),
-            held: 0,
+            held,
             stands: true,
         };
         Arc::make_mut(&mut self.ledger).enter(entry, false);
@@ -115,6 +124,26 @@ fn been_here_before_speaks_for_the_maps_that_come_back() {
     };
     assert!(claims(10.0, true) > 1.0 && claims(10.0, false) < -2.0);
     assert!(claims(200.0, true) < -2.0 && claims(200.0, false) > 0.2);
+}
+
+#[test]
+fn who_comes_back_over_known_floor_introduces_less() {
+    let after = |back_m: f64| {
+        let mut x_m: Vec<f64> = (0..60).map(f64::from).collect();
+        x_m.extend((0..30).map(|k| back_m + f64::from(k)));
+        let (mut talk, map) = (Talk::default(), map(&x_m));
+        let names = [0, 1, 2].map(|k| talk.name(k));
+        talk.claim(&map, &[called(0, names[0])]);
+        let before = log_likelihood(&talk, &[], &map);
+        // Said of a place that nobody spoke of, then again.
+        talk.claim_from(&map, 89, &[called(89, names[1])]);
+        let once = log_likelihood(&talk, &[], &map);
+        talk.claim_from(&map, 89, &[called(89, names[1])]);
+        (once - before, log_likelihood(&talk, &[], &map) - once)
+    };
+    let (known, new) = (after(10.0), after(200.0));
+    assert!((known.0 - new.0 - INTRODUCED_AGAIN.ln()).abs() < 0.05, "{known:?} {new:?}");
+    assert!((known.1 - new.1).abs() < 1e-9, "by then it is introduced");
 }
 
 #[test]
@@ -260,8 +289,8 @@ proptest! {
         }
         let standing = talk.standing();
         let mut fold = Fold::new(&talk, Floors::of(&[], &map), &map, &standing);
-        for (_, units) in &standing {
-            fold.hear(units);
+        for (testimony, units) in &standing {
+            fold.hear(testimony, units);
         }
         let place = said[at % said.len()].0;
         let mut p = |said| {
