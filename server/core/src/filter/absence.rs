@@ -24,6 +24,7 @@ use crate::graph::Graph;
 use crate::scan::agree::{Agreement, agreement};
 use crate::scan::view::Closeness;
 use crate::smoothing::{Relative, Structure};
+use crate::track::front::LOCAL_PATH_M;
 use libm::erf;
 
 /// p_D of a single pair within [`OVERLAP_M`] of each other, by the search.
@@ -51,6 +52,8 @@ const SURE_OVERLAP: f64 = 0.5;
 const COMPARED_MIN: u32 = 20;
 /// Places along the path that are farther apart are of two floors, which either is expected to be found, metres.
 const FLOOR_M: f64 = 10.0;
+/// Places that are looked at again for a map that comes back.
+const LOOKED_BACK: Vertex = 100;
 /// Path that shows the same walls, metres.
 const SAME_WALLS_M: f64 = 5.0;
 
@@ -95,6 +98,32 @@ fn log_expected(
         None => log_missed(floor, looked),
     };
     floors.map(of).sum()
+}
+
+/// What a map has contradicted itself since place `from`, so far back as matters: for one that nobody kept.
+pub fn log_contradictions(graph: &Graph, structure: &Structure, particle: &Particle, from: Vertex) -> f64 {
+    let end = graph.places().len() as Vertex;
+    let (mut log, mut last_m) = (0.0, f64::NEG_INFINITY);
+    for t in from.max(end.saturating_sub(LOOKED_BACK))..end {
+        let path_m = graph.place(t).path_m;
+        if path_m - last_m < SAME_WALLS_M {
+            continue;
+        }
+        let here = particle.belief.pose(t);
+        let near = |i: &Vertex| particle.belief.pose(*i).distance_m(&here) < OVERLAP_M;
+        let pairs: Vec<Vertex> =
+            (0..t).filter(|&i| graph.apart(i, t, LOCAL_PATH_M)).filter(near).step_by(2).collect();
+        let Ok(mut predicted) = particle.belief.relative(structure, t, &pairs) else { continue };
+        predicted.sort_by_key(|r| r.i);
+        let floors = predicted.chunk_by(|a, b| !graph.apart(a.i, b.i, FLOOR_M));
+        let of_place: f64 =
+            floors.filter_map(|floor| contradicted(graph, t, floor)).map(log_contradicted).sum();
+        if of_place < -0.1 {
+            last_m = path_m;
+            log += of_place;
+        }
+    }
+    log
 }
 
 /// log p(c | right) / p(c | wrong).

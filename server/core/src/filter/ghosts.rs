@@ -31,7 +31,8 @@ pub struct Ghost {
     pub there: bool,
     /// Its odds against what was kept.
     pub log_odds: f64,
-    /// How much of that the kept graphs gained or lost since, see [`Ghosts::kept_gained`].
+    /// How much of that the kept graphs gained or lost since, see [`Ghosts::kept_gained`], and what its own was found
+    /// to have lost.
     pub since: f64,
     /// log p(λ | G) of the best graph when it was dropped.
     pub log_words: f64,
@@ -85,10 +86,11 @@ impl Ghosts {
         }
     }
 
-    /// The kept graphs gained so much, or paid, for where they lay the newest places: graphs that held those
-    /// elsewhere did neither.
+    /// The kept graphs gained so much, or paid, for where they lay the newest places. Graphs that held those
+    /// elsewhere did neither; where nobody knows what a graph would have gained, it is held to have gained as much.
     pub fn kept_gained(&mut self, log_gain: f64) {
-        for g in self.ghosts.iter_mut().filter(|g| !g.there) {
+        for g in &mut self.ghosts {
+            let log_gain = if g.there { log_gain.min(0.0) } else { log_gain };
             g.log_odds -= log_gain;
             g.since -= log_gain;
         }

@@ -3,8 +3,9 @@
 
 use crate::effects::{Effect, Effects};
 use crate::filter::Filter;
+use crate::filter::absence::log_contradictions;
 use crate::filter::answer::{Given, with_edge};
-use crate::filter::ghosts::Ghost;
+use crate::filter::ghosts::{Ghost, REOPENED};
 use crate::filter::particle::Particle;
 use crate::filter::weigh::judge;
 use crate::filter::words::Words;
@@ -38,7 +39,7 @@ impl Filter {
         let best = &particles[0];
         for ghost in ghosts.iter_mut().filter(|g| g.there && !best.holds(g.edge.question)) {
             if let Some(judged) = judge(graph, structure, best, &ghost.edge) {
-                ghost.log_odds = judged.log_there;
+                ghost.log_odds = judged.log_there + ghost.since;
             }
         }
     }
@@ -61,8 +62,17 @@ impl Filter {
         self.update();
         let mut p = self.best().clone();
         p.refused.retain(|&q| q != edge.question);
-        p.log_weight += judged.log_there;
-        with_edge(p, &edge, judged.lets_go, Given { graph: &self.graph, structure: &self.structure, words })
+        p.log_weight += judged.log_there + ghost.since;
+        let given = Given { graph: &self.graph, structure: &self.structure, words };
+        let mut p = with_edge(p, &edge, judged.lets_go, given)?;
+        let lost = log_contradictions(&self.graph, &self.structure, &p, edge.j);
+        p.log_weight += lost;
+        let log_odds = p.log_weight - self.best().log_weight;
+        if log_odds < REOPENED.ln() {
+            self.ghosts.drop_answer(Ghost { log_odds, since: ghost.since + lost, ..ghost.clone() });
+            return None;
+        }
+        Some(p)
     }
 
     fn give_up(&mut self, ghost: &Ghost, words: &dyn Words) -> Option<Particle> {
