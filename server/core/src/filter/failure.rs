@@ -32,12 +32,11 @@ const ANYWHERE_M2: f64 = 400.0;
 /// likeliest stretch.
 pub fn log_failed(graph: &Graph, particle: &Particle, edge: &Edge) -> Option<(f64, LetGo)> {
     let pose = |v: Vertex| particle.belief.pose(v);
-    // Where an older edge ties the path, what came before is in order.
-    let tied = particle.edges.iter().map(|e| e.j).filter(|&j| j < edge.j).max().unwrap_or(0);
-    let first = tied.max(edge.i).max(edge.j.saturating_sub(PLACES_MAX)) + 1;
+    let first = edge.i.max(edge.j.saturating_sub(PLACES_MAX)) + 1;
+    let tied = tied(particle, first, edge.j);
     let there = pose(edge.i).compose(&edge.i_from_j).compose(&pose(edge.j).inverse());
     let (mut sum, mut best): (f64, Option<(f64, Vertex)>) = (f64::NEG_INFINITY, None);
-    for s in first..=edge.j {
+    for s in (first..=edge.j).filter(|s| !tied[(s - first) as usize]) {
         let chain = &graph.place(s).chain;
         let needed = pose(s - 1).between(&there.compose(&pose(s)));
         let log =
@@ -48,6 +47,22 @@ pub fn log_failed(graph: &Graph, particle: &Particle, edge: &Edge) -> Option<(f6
         }
     }
     best.map(|(_, from)| (sum, LetGo { from, moved: there }))
+}
+
+/// Which stretches from `first` to `last` an edge spans, that says as the chain does how its ends lie: those are
+/// in order.
+fn tied(particle: &Particle, first: Vertex, last: Vertex) -> Vec<bool> {
+    let mut spans = vec![0i32; (last + 1 - first) as usize];
+    for e in particle.edges.iter().filter(|e| (first..last).contains(&e.j)) {
+        spans[(e.i + 1).saturating_sub(first) as usize] += 1;
+        spans[(e.j + 1 - first) as usize] -= 1;
+    }
+    let mut sum = 0;
+    let running = spans.iter().map(|change| {
+        sum += change;
+        sum > 0
+    });
+    running.collect()
 }
 
 /// log f(δ), m⁻² rad⁻¹.
@@ -65,6 +80,19 @@ fn log_f(off: &Pose2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::filter::weigh::tests::{edge, fit};
+
+    #[test]
+    fn what_an_edge_spans_is_in_order() {
+        let mut particle = Particle::empty();
+        let edge = |i, j| Edge { i, j, ..edge(&fit(1.0, 0.9, 3)) };
+        particle.add(edge(3, 8));
+        particle.add(edge(6, 10));
+        particle.add(edge(1, 20));
+        let tied = tied(&particle, 2, 12);
+        let expected: Vec<bool> = (2..=12).map(|s| (4..=10).contains(&s)).collect();
+        assert_eq!(tied, expected, "an edge of later says nothing yet");
+    }
 
     #[test]
     fn where_a_robot_is_that_lost_its_way_is_a_density() {

@@ -73,16 +73,13 @@ impl Ghosts {
         }
     }
 
-    /// A fit of a question to which the best graph says "elsewhere" was seen, and weighs so much for "there": of all
-    /// fits of a question the likeliest is what the answer is worth.
-    pub fn see(&mut self, edge: &Edge, log_there: f64, log_words: f64) {
+    /// A fit of a question to which all graphs say "elsewhere" was seen, and weighs so much for "there" by the best
+    /// one: of all fits of a question the likeliest is what the answer is worth.
+    pub fn see(&mut self, edge: &Edge, log_there: f64) {
         let known = self.ghosts.iter_mut().find(|g| g.there && g.edge.question == edge.question);
-        if known.as_ref().is_none_or(|g| g.log_odds < log_there) && log_there > FORGOTTEN.ln() {
-            let ghost = Ghost { edge: edge.clone(), there: true, log_odds: log_there, since: 0.0, log_words };
-            match known {
-                Some(g) => *g = ghost,
-                None => self.drop_answer(ghost),
-            }
+        if let Some(g) = known.filter(|g| g.log_odds < log_there + g.since) {
+            g.edge = edge.clone();
+            g.log_odds = log_there + g.since;
         }
     }
 
@@ -159,6 +156,28 @@ mod tests {
         ghosts.kept_gained(-3.2);
         assert_eq!(ghosts.next_reopened(0.0).map(|g| g.edge.question.n), Some(0));
         assert!(ghosts.unresolved(0.0) < 1e-12);
+    }
+
+    #[test]
+    fn what_the_kept_pay_speaks_for_what_they_refuse_and_what_they_gain_not_against_it() {
+        let mut ghosts = Ghosts::default();
+        ghosts.drop_answer(ghost(0, true, 0.001));
+        let before = ghosts.unresolved(0.0);
+        ghosts.kept_gained(9.0);
+        assert!((ghosts.unresolved(0.0) - before).abs() < 1e-12);
+        ghosts.kept_gained(-2.0);
+        assert!(ghosts.unresolved(0.0) > 7.0 * before);
+    }
+
+    #[test]
+    fn an_answer_is_worth_its_likeliest_fit() {
+        let mut ghosts = Ghosts::default();
+        ghosts.drop_answer(ghost(0, true, 0.001));
+        let likelier = Edge { j: 77, ..ghost(0, true, 0.5).edge };
+        ghosts.see(&Edge { j: 76, ..likelier.clone() }, -9.0);
+        assert!(ghosts.unresolved(0.0) < 0.0011);
+        ghosts.see(&likelier, -2.0);
+        assert_eq!(ghosts.next_reopened(0.0).map(|g| g.edge.j), Some(77));
     }
 
     #[test]

@@ -248,6 +248,10 @@ impl Filter {
             let edge = Edge::of(fit, t, testimony.question, testimony.log_looks);
             let (stances, judged) = self.stances(&edge, &testimony);
             self.ghosts.gain(testimony.question, testimony.gained);
+            let is_dropped = stances.iter().all(|s| *s == Stance::Elsewhere);
+            if let (true, Some(Some(judged))) = (is_dropped, judged.first()) {
+                self.ghosts.see(&edge, judged.log_there);
+            }
             let news = fit.kind == EdgeKind::Semantic || !judged.iter().all(|j| j.is_some_and(|j| j.known));
             known += usize::from(!news);
             let wanted = news || known <= KNOWN_MAX;
