@@ -80,12 +80,22 @@ fn log_f(off: &Pose2) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::filter::weigh::tests::{edge, fit};
+    use crate::edge::{EdgeKind, QuestionId};
+    use nalgebra::Matrix3;
 
     #[test]
     fn what_an_edge_spans_is_in_order() {
         let mut particle = Particle::empty();
-        let edge = |i, j| Edge { i, j, ..edge(&fit(1.0, 0.9, 3)) };
+        let edge = |i, j| Edge {
+            i,
+            j,
+            kind: EdgeKind::Distance,
+            i_from_j: Pose2::default(),
+            covariance: Matrix3::identity(),
+            question: QuestionId::default(),
+            log_looks: 0.0,
+            factor: 0,
+        };
         particle.add(edge(3, 8));
         particle.add(edge(6, 10));
         particle.add(edge(1, 20));
