@@ -30,6 +30,8 @@ const OF_ITS_KIND: [f64; 2] = [0.9, 0.3];
 const VISITED_BY_CHANCE: f64 = 0.3;
 /// Who comes back over floor that was talked about introduces so much less than on new floor.
 const INTRODUCED_AGAIN: f64 = 0.5;
+/// Talk is about floor so far around.
+const TALKED_ABOUT_M: f64 = 10.0;
 /// Places so far back along the path are no visit before.
 const VISITED_BACK: Vertex = 12;
 /// Two successive places are hardly farther apart.
@@ -158,8 +160,9 @@ struct Fold<'a> {
     /// What was said of each site so far.
     told: Vec<Vec<(LabelId, Tally)>>,
     joined: Joined,
-    /// Names that were spoken of so far.
+    /// Names that were spoken of so far, and where.
     mentioned: BTreeSet<LabelId>,
+    spoken_at: BTreeSet<Vertex>,
 }
 
 impl<'a> Fold<'a> {
@@ -193,11 +196,13 @@ impl<'a> Fold<'a> {
             told,
             joined: Joined::of(names),
             mentioned: BTreeSet::new(),
+            spoken_at: BTreeSet::new(),
         }
     }
 
     fn hear(&mut self, testimony: &Testimony, units: &[Units]) {
         self.mentioned.extend(self.talk.names(testimony));
+        self.spoken_at.insert(self.talk.ledger.entries()[testimony.utterance as usize].held);
         for Units { place, label, tally } in units {
             let Some(&site) = self.numbers.get(place) else { continue };
             if self.told[site].is_empty() {
@@ -225,16 +230,20 @@ impl<'a> Fold<'a> {
         ratio + rest.max(0.0)
     }
 
-    /// Names that nobody spoke of before are for floor where nobody was before.
+    /// Names that nobody spoke of before are for floor where nobody spoke before. A way that was driven in silence is
+    /// no such floor.
     fn introduced(&self, testimony: &Testimony) -> f64 {
         let is_first = self.mentioned.is_empty();
         let held = self.talk.ledger.entries()[testimony.utterance as usize].held;
         if is_first || self.talk.names(testimony).all(|label| self.mentioned.contains(&label)) {
             return 1.0;
         }
-        let Some(here) = site(self.talk, &self.floors, self.particle, held) else { return 1.0 };
-        let known = share(self.nearest_m(held, &here));
-        1.0 - known * (1.0 - INTRODUCED_AGAIN)
+        let at = |v: Vertex| site(self.talk, &self.floors, self.particle, v);
+        let Some(here) = at(held) else { return 1.0 };
+        let before = self.spoken_at.iter().filter(|&&v| v + VISITED_BACK < held).filter_map(|&v| at(v));
+        let near = before.filter(|s| s.floor == here.floor).map(|s| s.pose.distance_m(&here.pose));
+        let off = near.fold(f64::INFINITY, f64::min) / TALKED_ABOUT_M;
+        1.0 - (-0.5 * off * off).exp() * (1.0 - INTRODUCED_AGAIN)
     }
 
     fn of_claim(&mut self, utterance: u32, claim: Claim, own: &[(LabelId, f64)]) -> f64 {

@@ -128,12 +128,12 @@ fn been_here_before_speaks_for_the_maps_that_come_back() {
 
 #[test]
 fn who_comes_back_over_known_floor_introduces_less() {
-    let after = |back_m: f64| {
+    let after = |back_m: f64, spoken: Vertex| {
         let mut x_m: Vec<f64> = (0..60).map(f64::from).collect();
         x_m.extend((0..30).map(|k| back_m + f64::from(k)));
         let (mut talk, map) = (Talk::default(), map(&x_m));
         let names = [0, 1, 2].map(|k| talk.name(k));
-        talk.claim(&map, &[called(0, names[0])]);
+        talk.claim_from(&map, spoken, &[called(0, names[0])]);
         let before = log_likelihood(&talk, &[], &map);
         // Said of a place that nobody spoke of, then again.
         talk.claim_from(&map, 89, &[called(89, names[1])]);
@@ -141,9 +141,10 @@ fn who_comes_back_over_known_floor_introduces_less() {
         talk.claim_from(&map, 89, &[called(89, names[1])]);
         (once - before, log_likelihood(&talk, &[], &map) - once)
     };
-    let (known, new) = (after(10.0), after(200.0));
+    let (known, new, silent) = (after(10.0, 39), after(200.0, 39), after(10.0, 0));
     assert!((known.0 - new.0 - INTRODUCED_AGAIN.ln()).abs() < 0.05, "{known:?} {new:?}");
     assert!((known.1 - new.1).abs() < 1e-9, "by then it is introduced");
+    assert!((silent.0 - new.0).abs() < 0.01, "nobody spoke there");
 }
 
 #[test]
