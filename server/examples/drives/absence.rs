@@ -1,7 +1,7 @@
 //! How places contradict each other that a map lays over one another, where it is right and where it is not.
 //!
 //! The simulator's tours say what may have happened beside what did: each hypothesis is a map of the same places.
-//! Every [`STEP_M`] of the path in the light that comes back to where it was before, by a map, is a look.
+//! Every [`SAME_WALLS_M`] of the path in the light that comes back to where it was before, by a map, is a look.
 
 use crate::dark::{mapped, pose};
 use crate::logistic::{Example, fit};
@@ -10,18 +10,13 @@ use rayon::prelude::*;
 use std::ops::Range;
 use toponym_core::Pose2;
 use toponym_core::edge::Vertex;
-use toponym_core::filter::absence::{CONTRADICTED, contradicted};
+use toponym_core::filter::absence::{CONTRADICTED, FLOOR_M, OVERLAP_M, SAME_WALLS_M, contradicted};
 use toponym_core::graph::Graph;
 use toponym_core::smoothing::Relative;
 use toponym_core::track::front::LOCAL_PATH_M;
 use toponym_sim::tours::{Hypothesis, tour};
 
 const TOURS: [&str; 8] = ["small", "large", "autonomous", "twins", "ring", "rows", "clean", "start"];
-/// Path between looks, and over which places are one floor, metres.
-const STEP_M: f64 = 5.0;
-const FLOOR_M: f64 = 10.0;
-/// Places that a map lays so near are compared, metres; maps that differ less there are one.
-const NEAR_M: f64 = 2.0;
 /// How well a map knows that: standard deviations, m, m, rad.
 const SIGMAS: [f64; 3] = [0.05, 0.05, 0.01];
 /// Edges of the bins that are told, shares of points.
@@ -99,7 +94,7 @@ fn differs(truth: &[Option<Pose2>], map: &[Option<Pose2>], i: usize, t: usize) -
     let between = |m: &[Option<Pose2>]| Some(m[i]?.between(&m[t]?));
     let (Some(a), Some(b)) = (between(truth), between(map)) else { return false };
     let off = a.between(&b);
-    off.x_m.hypot(off.y_m) > NEAR_M || off.yaw_rad.abs() > 0.5
+    off.x_m.hypot(off.y_m) > OVERLAP_M || off.yaw_rad.abs() > 0.5
 }
 
 /// The shares of contradicted points of all looks in a map, at pairs that `counts`.
@@ -108,12 +103,12 @@ fn shares(graph: &Graph, map: &[Option<Pose2>], counts: impl Fn(usize, usize) ->
     let (mut shares, mut last_m) = (Vec::new(), f64::NEG_INFINITY);
     for t in 0..map.len() {
         let path_m = graph.places()[t].path_m;
-        if path_m - last_m < STEP_M {
+        if path_m - last_m < SAME_WALLS_M {
             continue;
         }
         let relative = |i: usize| {
             let i_from_a = map[i]?.between(&map[t]?);
-            let near = i_from_a.x_m.hypot(i_from_a.y_m) < NEAR_M
+            let near = i_from_a.x_m.hypot(i_from_a.y_m) < OVERLAP_M
                 && graph.apart(i as Vertex, t as Vertex, LOCAL_PATH_M);
             (near && counts(i, t)).then_some(Relative { i: i as Vertex, i_from_a, covariance })
         };

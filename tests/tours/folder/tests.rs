@@ -71,6 +71,7 @@ fn what_the_servers_map_makes_of_a_folder_scores_as_the_run_itself() {
     assert_eq!((setting.tour.as_str(), setting.language.as_str()), ("walk", "simple"));
     let mapped = map(&case, Settings { particles: 4, preset: Preset::Toponym }).unwrap();
     let own = Outcome::new(case.seed, &case.truth, &mapped, None);
+    // Weights told are less what is unresolved: their last bits differ.
     let rounded = |outcome: &Outcome| {
         let mut end = outcome.end().unwrap().clone();
         end.graphs.iter_mut().for_each(|(weight, _)| *weight = (*weight * 1e9).round());

@@ -7,8 +7,9 @@
 //! p(c | right) / p(c | wrong) = κ + (1 − κ) · min(1, (c / c₀)^−w)
 //! ```
 //!
-//! c₀ what contradicts in right maps, too, κ for what was moved between two visits. What agrees is no evidence: a copy agrees, too. If it does not know,
-//! places that were looked at and do not look alike, or elsewhere only, weigh by
+//! c₀ what contradicts in right maps, too, κ for what was moved between two visits. What agrees is no evidence: a
+//! copy agrees, too. If it does not know, places that were looked at and do not look alike, or elsewhere only, weigh
+//! by
 //!
 //! ```text
 //! p(no fit | G) / p(no fit | new ground) = 1 − p_D · ō,    ō = P(the two overlap) under x⁻
@@ -30,7 +31,7 @@ use libm::erf;
 /// p_D of a single pair within [`OVERLAP_M`] of each other, by the search.
 const FOUND: f64 = 0.8;
 /// Places this near overlap …
-const OVERLAP_M: f64 = 2.0;
+pub const OVERLAP_M: f64 = 2.0;
 /// … if either has so many surfaces to show.
 const SURFACES_MIN: usize = 60;
 /// Fits within so much of where they are expected, beyond its spread, are those expected.
@@ -38,10 +39,11 @@ const EXPECTED_M: f64 = 0.5;
 const EXPECTED_RAD: f64 = 0.1;
 /// So many standard deviations of the spread.
 const SIGMAS: f64 = 3.0;
-/// c₀ and w: learned by `--example drives -- absence` of the server from simulated tours, in right maps of them and
-/// in wrong ones.
+/// c₀, beyond which right maps hardly ever are, and w, the smaller of what either half of the drives teaches: by
+/// `--example drives -- absence` of the server, from right and wrong maps of simulated tours.
 pub const CONTRADICTED: (f64, f64) = (0.1, 5.5);
-/// κ: of looks at a place that is known so many find something moved, a door or a table.
+/// κ: of looks at a place that is known so many find something moved, a door or a table. Assumed: nothing is moved in
+/// simulated tours.
 const MOVED: f64 = 0.02;
 /// How certain the relative pose must be for that …
 const SURE_SIGMA_M: f64 = 0.3;
@@ -51,11 +53,11 @@ const SURE_OVERLAP: f64 = 0.5;
 /// Points that must be seen or seen through for an outcome.
 const COMPARED_MIN: u32 = 20;
 /// Places along the path that are farther apart are of two floors, which either is expected to be found, metres.
-const FLOOR_M: f64 = 10.0;
+pub const FLOOR_M: f64 = 10.0;
 /// Places that are looked at again for a map that comes back.
 const LOOKED_BACK: Vertex = 100;
 /// Path that shows the same walls, metres.
-const SAME_WALLS_M: f64 = 5.0;
+pub const SAME_WALLS_M: f64 = 5.0;
 
 /// log factor of place `t` for one particle, given what was looked at and what was found; what it pays is
 /// remembered.

@@ -22,7 +22,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 pub const LOOKS: [f64; 4] = [1.92, -1.88, 1.17, -1.74];
 /// V: the area in which a pair is searched, m².
 const SEARCHED_M2: f64 = 400.0;
-/// ν: copies of a stretch, as far as scans can tell, in such an area …
+/// ν: copies of a stretch, as far as scans can tell, in such an area, by which tours without words are about likeliest
+/// (`server/ARCHITECTURE.md`, Numbers) …
 const COPIES: f64 = 6.0;
 /// … and π_m: their headings, by quarter turns, and any.
 const TURNED: [f64; 4] = [0.65, 0.1, 0.1, 0.1];

@@ -28,7 +28,7 @@ const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
 const OF_ITS_KIND: [f64; 2] = [0.9, 0.3];
 /// How often a place has been seen before when somebody speaks of it.
 const VISITED_BY_CHANCE: f64 = 0.3;
-/// Who comes back over floor that was talked about introduces so much less than on new floor.
+/// Who comes back over floor that was talked about introduces so much less than on new floor: assumed, not learned.
 const INTRODUCED_AGAIN: f64 = 0.5;
 /// Talk is about floor so far around.
 const TALKED_ABOUT_M: f64 = 10.0;
