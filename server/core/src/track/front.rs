@@ -7,6 +7,7 @@
 //! sees nothing; the local maps on both sides are then tied as a whole (`front/bridge.rs`).
 
 use self::bridge::Dark;
+use self::registration::Stood;
 use crate::edge::PlaceId;
 use crate::event::StampNs;
 use crate::geometry::{Pose2, wrap};
@@ -168,7 +169,7 @@ impl FrontEnd {
             }
         } else if let Some(before) = self.odom_from_body {
             let dt_s = stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9;
-            let stood = self.front_from_body;
+            let stood = Stood { front_from_body: self.front_from_body, dt_s };
             self.predict(&before.between(&odom_from_body), dt_s);
             if !blind && (self.is_dark() || self.is_vague()) {
                 self.land();

@@ -13,6 +13,9 @@ use nalgebra::{Matrix3, Vector3};
 const GATE_M: f32 = 0.6;
 /// Headings farther from where it begins are not found.
 const LEAP_RAD: f64 = 0.35;
+/// What no robot among people exceeds: what seems to is a look-alike.
+const SPEED_MAX_M_S: f64 = 3.0;
+const TURN_MAX_RAD_S: f64 = 4.0;
 /// Share of a scan's points on known surfaces below which the fit is looked at twice.
 const SHARE_SURE: f64 = 0.6;
 /// Below it the scan says nothing about the pose.
@@ -44,10 +47,26 @@ const HARDLY_REGISTERED: f64 = 0.003;
 /// φ where scans and wheels part by so much, distance².
 const PARTED: [(f64, f64); 2] = [(36.0, 0.003), (100.0, 0.02)];
 
+/// Where the body was at the scan before, so long ago.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stood {
+    pub front_from_body: Pose2,
+    pub dt_s: f64,
+}
+
+impl Stood {
+    /// Whether a robot may have come there since.
+    fn reaches(&self, front_from_body: &Pose2) -> bool {
+        let step = self.front_from_body.between(front_from_body);
+        step.x_m.hypot(step.y_m) < f64::from(GATE_M) + SPEED_MAX_M_S * self.dt_s
+            && step.yaw_rad.abs() < LEAP_RAD + TURN_MAX_RAD_S * self.dt_s
+    }
+}
+
 impl FrontEnd {
-    /// Registers the scan to the local map around the prediction, or where the body `stood` if wheels moved it that
-    /// nothing fits there; what it says is fused.
-    pub(crate) fn correct(&mut self, sweep: &Sweep, stood: &Pose2) {
+    /// Registers the scan to the local map around the prediction, or where the body may be since it `stood` if wheels
+    /// moved it that nothing fits there; what it says is fused.
+    pub(crate) fn correct(&mut self, sweep: &Sweep, stood: &Stood) {
         let predicted = self.in_map.covariance(&self.wheels);
         let Some(information) = predicted.try_inverse() else { return };
         let prior = Prior {
@@ -58,9 +77,10 @@ impl FrontEnd {
         let points = thin(&sweep.points, VOXEL_M);
         let moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
         let mut found = self.register(&points, &prior);
-        if found.is_none() || leaps(&stood.between(&self.front_from_body)) {
+        if found.is_none() || leaps(&stood.front_from_body.between(&self.front_from_body)) {
             let as_good = |a: &Alignment| found.is_none_or(|f| a.inlier_share >= f.inlier_share);
-            found = self.around(&points, stood).filter(as_good).or(found);
+            let reached = self.around(&points, &stood.front_from_body, |pose| stood.reaches(pose));
+            found = reached.filter(as_good).or(found);
         }
         let Some(found) = found else {
             self.doubt(UNREGISTERED);
@@ -108,8 +128,13 @@ impl FrontEnd {
         best.filter(|b| b.inlier_share >= SHARE_MIN)
     }
 
-    /// Where in the local map, from a place and any heading, the points surely fit.
-    fn around(&mut self, points: &[Point], here: &Pose2) -> Option<Alignment> {
+    /// Where in the local map that it may be, from a place and any heading, the points surely fit.
+    fn around(
+        &mut self,
+        points: &[Point],
+        here: &Pose2,
+        may_be: impl Fn(&Pose2) -> bool,
+    ) -> Option<Alignment> {
         let wide = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
         let local = self.local();
         let from = |k: i32| {
@@ -117,7 +142,8 @@ impl FrontEnd {
             let prior = Prior { target_from_source: guess, information: wide, where_weak: 1.0 };
             align(points, local, &guess, Some(&prior), GATE_M)
         };
-        let best = (0..18).filter_map(from).max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
+        let fits = (0..18).filter_map(from).filter(|a| may_be(&a.target_from_source));
+        let best = fits.max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
         best.filter(|b| b.inlier_share >= SHARE_SURE)
     }
 
@@ -125,7 +151,7 @@ impl FrontEnd {
     /// now, whatever its odometry says?
     pub(crate) fn resume(&mut self, sweep: &Sweep) -> bool {
         let here = self.front_from_body;
-        let Some(found) = self.around(&thin(&sweep.points, VOXEL_M), &here) else { return false };
+        let Some(found) = self.around(&thin(&sweep.points, VOXEL_M), &here, |_| true) else { return false };
         self.front_from_body = found.target_from_source;
         self.wheels.lift();
         self.doubt(RESUMED);

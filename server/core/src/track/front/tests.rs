@@ -123,6 +123,20 @@ fn a_step_that_only_wheels_make_is_none() {
 }
 
 #[test]
+fn a_scan_that_only_fits_half_a_turn_away_is_of_somewhere_new() {
+    let mut front = FrontEnd::new(1.0);
+    for k in 0..45_i64 {
+        // Once about on the spot; what it sees then is the same room built the other way round.
+        let here = Pose2::new(-1.0, -1.0, PI / 20.0 * k.min(40) as f64);
+        let sees = if k <= 40 { here } else { here.compose(&Pose2::new(0.0, 0.0, PI)) };
+        front.scan(k * 200_000_000, here, seen(&sees, false));
+    }
+    let went = front.front_from_body();
+    assert!(went.yaw_rad.abs() < 0.5, "no robot turns half about in .2 s: {went:?}");
+    assert!(front.failed > 0.01, "nor is it sure where it is");
+}
+
+#[test]
 fn at_rest_and_turning_on_the_spot_it_stays_where_it_is() {
     let at_rest = (0..300).map(|_| 0.0);
     let turning = (0..300).map(|k| 0.05 * f64::from(k));
