@@ -35,6 +35,9 @@ const NAMES_OF_WAYS: f64 = 2.0;
 const JOINED_M: f64 = 3.0;
 /// The same of places where nothing is seen: what is open so far that the laser finds no wall is one yard.
 const DARK_M: f64 = 10.0;
+/// Two such places whose floors nothing ties are of one yard so often, wherever they seem to lie: a building has
+/// hardly more than one. Assumed.
+const ONE_YARD: f64 = 0.5;
 
 /// Over what a name holds: which sites share what is said of them.
 pub trait Support {
@@ -72,9 +75,14 @@ pub struct Site {
 pub fn share_between(a: &Site, b: &Site) -> f64 {
     let distance_m2 = (b.pose.x_m - a.pose.x_m).powi(2) + (b.pose.y_m - a.pose.y_m).powi(2);
     if a.dark && b.dark {
-        let drift_m2 = if a.floor == b.floor { 0.0 } else { (a.drift_m2 - b.drift_m2).abs() };
-        let variance_m2 = DARK_M.powi(2) + drift_m2;
-        DARK_M.powi(2) / variance_m2 * (-0.5 * distance_m2 / variance_m2).exp()
+        let within =
+            |variance_m2: f64| DARK_M.powi(2) / variance_m2 * (-0.5 * distance_m2 / variance_m2).exp();
+        if a.floor == b.floor {
+            within(DARK_M.powi(2))
+        } else {
+            let drift_m2 = (a.drift_m2 - b.drift_m2).abs();
+            ONE_YARD + (1.0 - ONE_YARD) * within(DARK_M.powi(2) + drift_m2)
+        }
     } else if a.floor == b.floor {
         share_of_square(distance_m2)
     } else {
