@@ -25,7 +25,7 @@ const ROOMS: [&str; 17] = [
     "mapper",
 ];
 /// The same within `language`.
-const LANGUAGE: [&str; 10] = [
+const LANGUAGE: [&str; 12] = [
     "measure",
     "relation",
     "lexicon",
@@ -34,6 +34,8 @@ const LANGUAGE: [&str; 10] = [
     "words",
     "reference",
     "grammar",
+    "reader",
+    "understand",
     "grounding",
     "clauses",
 ];

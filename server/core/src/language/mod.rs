@@ -22,15 +22,16 @@ pub(crate) mod grounding;
 pub(crate) mod lexicon;
 mod measure;
 mod notation;
+pub mod reader;
 mod reference;
 mod relation;
 #[cfg(test)]
 mod tests;
+mod understand;
 mod words;
 
 pub use act::{Act, Analysis, Content, Frame, Parse, Phrase, Sameness};
 pub use clauses::{Clause, clauses};
-pub use grammar::parse::{parse, parse_hearings, parse_query};
 pub use grounding::clause::{LandmarkBelief, Narrowing, Reading};
 pub use grounding::footprint::Footprint;
 pub use grounding::ground::{Grounding, ground_clause, ground_with};
@@ -42,4 +43,10 @@ pub use lexicon::names::Name;
 pub use lexicon::normalise::MAX_TEXT_BYTES;
 pub use reference::{pointed_to, resolve_it, seen_from_here, topic};
 pub use relation::Relation;
+pub use understand::{parse, parse_hearings, parse_query};
 pub use words::{NOT_UNDERSTOOD, words};
+
+/// An act in writing.
+pub fn written(content: &Content) -> String {
+    notation::content_notation(content)
+}

@@ -2,6 +2,7 @@
 //! scores such tables.
 
 mod reference;
+mod spoken;
 mod words;
 
 use super::*;
@@ -108,14 +109,12 @@ fn what_lies_nowhere_on_a_map_asserts_nothing() {
         "the sun is down",
         "the chair is next to the table",
         "this window is next to the bed",
-        "the door is next to the bathroom",
         "the man is next to the elevator",
         "sales are through the roof",
         "the truth is far from here",
         "the party is next door",
         "the sandwich is cold",
         "the zorb is my favourite",
-        "the gym is down here",
         "the gym is near the gym",
         "there is a lamp on the desk",
         "when you are in the gym turn left",
@@ -154,7 +153,7 @@ fn questions_assert_nothing_and_ask_for_a_name() {
 fn a_bare_name_asks_but_does_not_tell() {
     for text in ["Kitchen", "the kitchen", "kitchens", "ok, the kitchen please"] {
         assert_eq!(parse_query(text), Name::new("kitchen"), "{text}");
-        assert_eq!(parse(text).acts(), [], "{text}");
+        assert_eq!(asserted(text), [], "{text}");
     }
     assert_eq!(parse_query("the kitchen, the gym"), None);
     assert_eq!(parse_query("this is the kitchen"), None);

@@ -18,13 +18,11 @@
 //! the mural" gives a name, "this is the plan" or "this is great" gives none.
 
 use crate::language::act::{Act, Analysis, Content, Parse, Phrase};
-use crate::language::grammar::ask::asked_name;
 use crate::language::grammar::attach::Weighed;
 use crate::language::grammar::build::Readings;
 use crate::language::grammar::correct::fold;
-use crate::language::grammar::cursor::Cursor;
-use crate::language::grammar::sentence::{FILLERS, Read, TAGS, read};
-use crate::language::lexicon::names::{Kind, Name};
+use crate::language::grammar::sentence::{Read, read};
+use crate::language::lexicon::names::Kind;
 use crate::language::lexicon::normalise::sentences;
 use crate::language::notation::notation;
 
@@ -63,52 +61,6 @@ pub fn parse(text: &str) -> Parse {
         (false, _) => analyses(&clauses),
     };
     Parse { analyses }
-}
-
-/// What is said, over all hearings of a recogniser: the text and its alternatives, each with its
-/// probability. The text is the likeliest hearing; analyses of several hearings that agree are one.
-pub fn parse_hearings(text: &str, alternatives: &[(String, f64)]) -> Parse {
-    let others: Vec<f64> =
-        alternatives.iter().map(|(_, p)| if p.is_finite() { p.clamp(0.0, 1.0) } else { 0.0 }).collect();
-    let most = others.iter().copied().fold(0.0, f64::max);
-    let first = (1.0 - others.iter().sum::<f64>()).max(most).max(f64::MIN_POSITIVE);
-    let sum = first + others.iter().sum::<f64>();
-    let hearings =
-        std::iter::once((text, first)).chain(alternatives.iter().map(|(t, _)| t.as_str()).zip(others));
-    let mut all: Vec<Analysis> = Vec::new();
-    for (k, (heard, p)) in hearings.enumerate() {
-        for mut analysis in parse(heard).analyses {
-            analysis.weight *= p / sum;
-            analysis.hearing = k;
-            match all.iter_mut().find(|a| a.notation == analysis.notation) {
-                Some(same) => same.weight += analysis.weight,
-                None => all.push(analysis),
-            }
-        }
-    }
-    // An order or a figure of speech says nothing: it yields to what says something.
-    let says = |a: &Analysis| !a.acts.iter().all(|act| matches!(act.content, Content::Ignored(_)));
-    all.sort_by(|a, b| {
-        says(b).cmp(&says(a)).then(b.weight.total_cmp(&a.weight)).then(a.hearing.cmp(&b.hearing))
-    });
-    all.truncate(ANALYSES_MAX);
-    Parse { analyses: all }
-}
-
-/// The name asked for by a question ("where is the gym?") or a bare name ("gym").
-pub fn parse_query(text: &str) -> Option<Name> {
-    for act in parse(text).acts() {
-        if let Some(name) = asked_name(&act.content) {
-            return Some(name);
-        }
-    }
-    let sentences = sentences(text);
-    let [only] = sentences.as_slice() else { return None };
-    let mut at = Cursor::new(&only.words);
-    at.skip(FILLERS);
-    let asked = at.noun_phrase()?;
-    at.skip(TAGS);
-    at.at_end().then(|| asked.name()).flatten()
 }
 
 /// The likeliest reading of all clauses, and those that differ from it in one clause. (Readings that

@@ -1,0 +1,338 @@
+//! Words as data: what `server/core/lexicon` says of them.
+
+use crate::language::act::Head;
+use crate::language::relation::Relation;
+use std::collections::{BTreeMap, HashMap, HashSet};
+use std::sync::LazyLock;
+
+const CLASSES: &str = include_str!("../../../lexicon/english/classes.txt");
+const RELATIONS: &str = include_str!("../../../lexicon/english/relations.txt");
+const HEADS: &str = include_str!("../../../lexicon/english/heads.txt");
+const CONTRACTIONS: &str = include_str!("../../../lexicon/english/contractions.txt");
+
+/// What a word is, whatever stands beside it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Class {
+    /// "Is", "are".
+    Be,
+    /// "'s".
+    Owner,
+    /// "Has".
+    Have,
+    /// "Does".
+    Do,
+    /// "Will", "should".
+    Modal,
+    /// "Not".
+    Neg,
+    /// "Where".
+    Wh,
+    /// "And".
+    Conj,
+    /// "The".
+    Det,
+    /// "This".
+    Point,
+    /// "My".
+    Poss,
+    /// "They".
+    Pron,
+    /// "By".
+    Prep,
+    /// "Now".
+    Adv,
+    /// "Two".
+    Num,
+    /// "Second".
+    Ord,
+    /// "Nurse".
+    Person,
+    /// "Minute".
+    Time,
+    /// "Big".
+    Quality,
+    /// "Keep".
+    Verb,
+    /// A pause.
+    Comma,
+    /// The end of a sentence.
+    Stop,
+    /// The end of a question.
+    Question,
+    /// Not in the lexicon, but for nouns of places.
+    Open,
+}
+
+impl Class {
+    /// A short name, as features have it.
+    pub fn tag(self) -> &'static str {
+        match self {
+            Self::Be => "be",
+            Self::Owner => "'s",
+            Self::Have => "have",
+            Self::Do => "do",
+            Self::Modal => "modal",
+            Self::Neg => "neg",
+            Self::Wh => "wh",
+            Self::Conj => "conj",
+            Self::Det => "det",
+            Self::Point => "point",
+            Self::Poss => "poss",
+            Self::Pron => "pron",
+            Self::Prep => "prep",
+            Self::Adv => "adv",
+            Self::Num => "num",
+            Self::Ord => "ord",
+            Self::Person => "person",
+            Self::Time => "time",
+            Self::Quality => "qual",
+            Self::Verb => "verb",
+            Self::Comma => ",",
+            Self::Stop => ".",
+            Self::Question => "?",
+            Self::Open => "n",
+        }
+    }
+
+    /// Is it a number?
+    pub fn is_number(self) -> bool {
+        self == Self::Num
+    }
+
+    /// May stand within a name.
+    pub fn names(self) -> bool {
+        matches!(
+            self,
+            Self::Open | Self::Num | Self::Ord | Self::Person | Self::Time | Self::Quality | Self::Verb
+        )
+    }
+
+    /// Its word itself tells, rather than its class.
+    pub fn is_closed(self) -> bool {
+        !matches!(self, Self::Open | Self::Num | Self::Person | Self::Verb | Self::Quality)
+    }
+}
+
+/// What a relation's words say.
+#[derive(Clone, Debug)]
+pub struct Said {
+    /// In lower case.
+    pub words: Vec<String>,
+    /// The relation.
+    pub relation: Relation,
+    /// The landmark that is meant, if none needs to be named.
+    pub implied: Option<Implied>,
+}
+
+/// A landmark that needs no name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Implied {
+    /// Something pointed at.
+    Pointer(Pointer),
+    /// A corner.
+    Corner,
+}
+
+/// A head that is no name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pointer {
+    /// The place held.
+    Here,
+    /// Where the speaker points.
+    There,
+    /// Who is spoken to.
+    Agent,
+    /// Who speaks.
+    Speaker,
+    /// The way that one is going.
+    Path,
+    /// What was spoken of.
+    It,
+}
+
+impl Pointer {
+    /// As a phrase has it.
+    pub fn head(self) -> Head {
+        match self {
+            Self::Here => Head::Here,
+            Self::There => Head::There,
+            Self::Agent => Head::Agent,
+            Self::Speaker => Head::Speaker,
+            Self::Path => Head::Path,
+            Self::It => Head::It,
+        }
+    }
+}
+
+/// All that is known of words.
+#[derive(Debug)]
+pub struct Lexicon {
+    classes: HashMap<String, Class>,
+    /// By their first word, longest first.
+    relations: BTreeMap<String, Vec<Said>>,
+    heads: HashSet<&'static str>,
+    contractions: HashMap<&'static str, &'static str>,
+}
+
+/// The lexicon, read once.
+pub fn lexicon() -> &'static Lexicon {
+    static LEXICON: LazyLock<Lexicon> = LazyLock::new(Lexicon::read);
+    &LEXICON
+}
+
+/// Lines that say something: their two sides of a sign.
+fn entries(text: &'static str, sign: char) -> impl Iterator<Item = (&'static str, &'static str)> {
+    let lines = text.lines().filter(|l| !l.starts_with('#'));
+    lines.filter_map(move |l| l.split_once(sign)).map(|(a, b)| (a.trim(), b.trim()))
+}
+
+impl Lexicon {
+    fn read() -> Self {
+        let mut classes = HashMap::new();
+        for (name, words) in entries(CLASSES, ':') {
+            let (class, is_stem) = match name {
+                "be" => (Class::Be, false),
+                "have" => (Class::Have, false),
+                "do" => (Class::Do, false),
+                "modal" => (Class::Modal, false),
+                "neg" => (Class::Neg, false),
+                "wh" => (Class::Wh, false),
+                "conj" => (Class::Conj, false),
+                "det" => (Class::Det, false),
+                "point" => (Class::Point, false),
+                "poss" => (Class::Poss, false),
+                "pron" => (Class::Pron, false),
+                "prep" => (Class::Prep, false),
+                "adv" => (Class::Adv, false),
+                "num" => (Class::Num, false),
+                "ord" => (Class::Ord, false),
+                "person" => (Class::Person, false),
+                "time" => (Class::Time, false),
+                "quality" => (Class::Quality, false),
+                "verb" => (Class::Verb, true),
+                _ => (Class::Verb, false),
+            };
+            for word in words.split(' ').filter(|w| !w.is_empty()) {
+                let all = if is_stem { inflected(word) } else { vec![word.to_owned()] };
+                for form in all {
+                    classes.entry(form).or_insert(class);
+                }
+            }
+        }
+        for (sign, class) in
+            [("'s", Class::Owner), (",", Class::Comma), (".", Class::Stop), ("?", Class::Question)]
+        {
+            classes.insert(sign.to_owned(), class);
+        }
+        let mut relations: BTreeMap<String, Vec<Said>> = BTreeMap::new();
+        for (pattern, said) in entries(RELATIONS, '=') {
+            let mut words = said.split(' ');
+            let name = words.next().unwrap_or_default();
+            let Some(&relation) = Relation::ALL.iter().find(|r| r.notation() == name) else { continue };
+            let implied = words.next().and_then(|w| {
+                Some(Implied::Pointer(match w {
+                    "here" => Pointer::Here,
+                    "there" => Pointer::There,
+                    "agent" => Pointer::Agent,
+                    "speaker" => Pointer::Speaker,
+                    "path" => Pointer::Path,
+                    _ => return Some(Implied::Corner),
+                }))
+            });
+            for words in expanded(pattern) {
+                let Some(first) = words.first().cloned() else { continue };
+                relations.entry(first).or_default().push(Said { words, relation, implied });
+            }
+        }
+        for said in relations.values_mut() {
+            said.sort_by_key(|s| std::cmp::Reverse(s.words.len()));
+        }
+        let heads = HEADS.lines().filter(|l| !l.starts_with('#')).flat_map(|l| l.split(' ')).collect();
+        Self { classes, relations, heads, contractions: entries(CONTRACTIONS, '=').collect() }
+    }
+
+    /// What a word is.
+    pub fn class(&self, word: &str) -> Class {
+        if let Some(&class) = self.classes.get(word) {
+            return class;
+        }
+        match word.bytes().next() {
+            Some(b) if b.is_ascii_digit() => Class::Num,
+            _ if word.len() > 4 && word.ends_with("ly") => Class::Adv,
+            _ => Class::Open,
+        }
+    }
+
+    /// Whether a noun names places by itself.
+    pub fn is_head(&self, word: &str) -> bool {
+        self.heads.contains(word) || crate::language::lexicon::is_place(word)
+    }
+
+    /// What a word is short for.
+    pub fn contraction(&self, word: &str) -> Option<&'static str> {
+        self.contractions.get(word).copied()
+    }
+
+    /// All relations, in a fixed order.
+    pub fn all_relations(&self) -> Vec<&Said> {
+        let mut all: Vec<&Said> = self.relations.values().flatten().collect();
+        all.sort_by_key(|s| (&s.words, s.relation, s.implied.is_some()));
+        all
+    }
+
+    /// Relations that may begin with a word, longest first.
+    pub fn relations(&self, first: &str) -> &[Said] {
+        self.relations.get(first).map_or(&[], Vec::as_slice)
+    }
+}
+
+/// The forms of a verb: a stem ending in a single consonant after a single vowel doubles it.
+fn inflected(stem: &str) -> Vec<String> {
+    let bytes = stem.as_bytes();
+    let is_vowel = |b: u8| matches!(b, b'a' | b'e' | b'i' | b'o' | b'u');
+    let mut forms = vec![stem.to_owned()];
+    let (last, before) = (bytes[bytes.len() - 1], bytes[bytes.len().saturating_sub(2)]);
+    let root = match last {
+        b'e' => stem[..stem.len() - 1].to_owned(),
+        b'y' if !is_vowel(before) => format!("{}i", &stem[..stem.len() - 1]),
+        _ => stem.to_owned(),
+    };
+    let ends_hissing = ["s", "x", "ch", "sh", "o"].iter().any(|e| stem.ends_with(e));
+    forms.push(if ends_hissing || root.ends_with('i') { format!("{root}es") } else { format!("{stem}s") });
+    let doubled = bytes.len() > 2
+        && !is_vowel(last)
+        && !matches!(last, b'w' | b'x' | b'y')
+        && is_vowel(before)
+        && !is_vowel(bytes[bytes.len() - 3]);
+    let long = if doubled { format!("{stem}{}", last as char) } else { root.clone() };
+    forms.push(format!("{long}ed"));
+    forms.push(format!("{}ing", if last == b'y' { stem } else { &long }));
+    if doubled {
+        forms.push(format!("{stem}ed"));
+        forms.push(format!("{stem}ing"));
+    }
+    forms
+}
+
+/// "a|b (c) d" as all that it stands for.
+fn expanded(pattern: &str) -> Vec<Vec<String>> {
+    let mut all: Vec<Vec<String>> = vec![vec![]];
+    let spaced = pattern.replace("(a)round", "around|round");
+    for part in spaced.split(' ') {
+        let optional = part.starts_with('(');
+        let choices: Vec<&str> = part.trim_matches(['(', ')']).split('|').collect();
+        let mut next = Vec::new();
+        for words in &all {
+            if optional {
+                next.push(words.clone());
+            }
+            for choice in &choices {
+                let mut more = words.clone();
+                more.push((*choice).to_owned());
+                next.push(more);
+            }
+        }
+        all = next;
+    }
+    all
+}

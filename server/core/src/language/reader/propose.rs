@@ -1,0 +1,275 @@
+//! Everything that a text's groups may say: acts, for the judge to weigh.
+
+use crate::language::act::{
+    About, Content, Head, Locate, Modifiers, Ordinal, Phrase, Quantity, Question, Sameness,
+};
+use crate::language::lexicon::names::Name;
+use crate::language::notation::phrase_notation;
+use crate::language::reader::groups::{Groups, Noun, Rel, Span, number};
+use crate::language::reader::kind::Kind;
+use crate::language::reader::lexicon::{Class, Implied, Pointer};
+use crate::language::reader::tokens::Token;
+use crate::language::relation::Relation;
+
+/// An act that may be said, and the groups that it is made of.
+#[derive(Clone, Debug)]
+pub struct Proposal {
+    /// Its kind.
+    pub kind: Kind,
+    /// What would be said.
+    pub content: Content,
+    /// The name, or the figure.
+    pub noun: Option<usize>,
+    /// The landmark, or the other name.
+    pub other: Option<usize>,
+    /// The relation.
+    pub rel: Option<usize>,
+    /// Words that no other act may have.
+    pub takes: Vec<Span>,
+}
+
+/// A figure is at most so many words from its relation.
+const FAR: usize = 14;
+
+/// All of them.
+pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
+    let mut all = Vec::new();
+    let named = |n: &Noun| n.pointer.is_none();
+    for (i, noun) in groups.nouns.iter().enumerate().filter(|(_, n)| named(n)) {
+        of_name(tokens, i, noun, &mut all);
+    }
+    for (i, a) in groups.nouns.iter().enumerate() {
+        for (k, b) in groups.nouns.iter().enumerate().filter(|(_, b)| named(b)) {
+            if i == k || a.pointer.is_some_and(|p| p != Pointer::It) {
+                continue;
+            }
+            if b.span.from < a.span.from || a.span.gap(b.span).is_none_or(|gap| gap > FAR) {
+                continue;
+            }
+            all.push(Proposal {
+                kind: Kind::Alias,
+                content: Content::Alias { what: a.phrase.clone(), also: b.phrase.clone() },
+                noun: Some(i),
+                other: Some(k),
+                rel: None,
+                takes: vec![a.span, b.span],
+            });
+        }
+    }
+    let way = steps(tokens, groups);
+    for (r, rel) in groups.rels.iter().enumerate() {
+        for spot in spots(tokens, groups, r, rel) {
+            located(groups, &spot, &way, &mut all);
+        }
+    }
+    for (n, noun) in groups.nouns.iter().enumerate() {
+        if let Some(spot) = on_floor(tokens, n, noun) {
+            located(groups, &spot, &way, &mut all);
+        }
+    }
+    let whole = vec![Span { from: 0, to: tokens.len() }];
+    let bare =
+        |kind, content| Proposal { kind, content, noun: None, other: None, rel: None, takes: whole.clone() };
+    let start = Content::Same { what: Phrase::new(Head::Here), like: Phrase::new(Head::Start), same: true };
+    all.push(bare(Kind::Start, start));
+    let used =
+        Content::Label { at: Phrase::new(Head::Here), what: purpose(tokens), sameness: Sameness::Open };
+    all.push(bare(Kind::Use, used));
+    let ask = |kind, head| Content::Ask { kind, about: About::Phrase(Phrase::new(head)) };
+    all.push(bare(Kind::What, ask(Question::What, Head::Unknown)));
+    all.push(bare(Kind::WhatHere, ask(Question::What, Head::Here)));
+    all.push(bare(Kind::Way, Content::Route { steps: way, then: None }));
+    all
+}
+
+fn of_name(tokens: &[Token], i: usize, noun: &Noun, all: &mut Vec<Proposal>) {
+    let here = || Phrase::new(Head::Here);
+    let label = |at: Phrase| Content::Label { at, what: noun.phrase.clone(), sameness: Sameness::Open };
+    let same = |same| Content::Same { what: here(), like: noun.phrase.clone(), same };
+    let ask = |kind| Content::Ask { kind, about: About::Phrase(noun.phrase.clone()) };
+    let mend = |is| Content::Correct { was: None, is: Box::new(is) };
+    let mut add = |kind, content| {
+        all.push(Proposal { kind, content, noun: Some(i), other: None, rel: None, takes: vec![noun.span] });
+    };
+    add(Kind::Label, label(here()));
+    add(Kind::Before, label(Phrase::new(Head::Previous)));
+    add(Kind::NotLabel, Content::Negate(Box::new(label(here()))));
+    add(Kind::MendLabel, mend(label(here())));
+    add(Kind::MendBefore, mend(label(Phrase::new(Head::Previous))));
+    add(Kind::Same, same(true));
+    add(Kind::Other, same(false));
+    add(Kind::NotSame, Content::Negate(Box::new(same(true))));
+    add(Kind::Attribute, Content::Attribute { what: noun.phrase.clone(), value: value(tokens, noun.span) });
+    add(Kind::Where, ask(Question::Where));
+    add(Kind::Route, ask(Question::Route));
+    add(Kind::HowFar, ask(Question::HowFar));
+    add(
+        Kind::IsLabel,
+        Content::Ask { kind: Question::Whether, about: About::Content(Box::new(label(here()))) },
+    );
+}
+
+/// Where something may lie.
+struct Spot {
+    relation: Relation,
+    rel: Option<usize>,
+    /// The first of the landmarks, if it is a group.
+    noun: Option<usize>,
+    landmarks: Vec<Phrase>,
+    /// Words of relation and landmarks.
+    takes: Span,
+}
+
+/// All spots that a relation's words may tell.
+fn spots(tokens: &[Token], groups: &Groups, r: usize, rel: &Rel) -> Vec<Spot> {
+    let spot = |noun, landmarks, to, relation| Spot {
+        relation,
+        rel: Some(r),
+        noun,
+        landmarks,
+        takes: Span { from: rel.span.from, to },
+    };
+    match rel.implied {
+        Some(Implied::Pointer(p)) => {
+            return vec![spot(None, vec![Phrase::new(p.head())], rel.span.to, rel.relation)];
+        }
+        Some(Implied::Corner) => {
+            let corner = Name::new("corner").map(|n| Phrase::new(Head::Named(n)));
+            return corner.map(|c| spot(None, vec![c], rel.span.to, rel.relation)).into_iter().collect();
+        }
+        None => {}
+    }
+    let mut all = Vec::new();
+    let after = after_articles(tokens, rel.span.to);
+    let begins = |n: &Noun| n.span.from == after || n.span.from == rel.span.to;
+    for (k, n) in groups.nouns.iter().enumerate().filter(|(_, n)| begins(n)) {
+        if rel.relation == Relation::Between {
+            let and = tokens.get(n.span.to).is_some_and(|t| t.text == "and");
+            let second = after_articles(tokens, n.span.to + 1);
+            for m in groups.nouns.iter().filter(|m| and && m.span.from == second) {
+                all.push(spot(Some(k), vec![n.phrase.clone(), m.phrase.clone()], m.span.to, rel.relation));
+            }
+            if !tokens[n.head].text.ends_with('s') {
+                continue;
+            }
+        }
+        let relation = match rel.relation {
+            Relation::On | Relation::In | Relation::At if n.is_floor => Relation::OnLevel,
+            relation => relation,
+        };
+        all.push(spot(Some(k), vec![n.phrase.clone()], n.span.to, relation));
+    }
+    // "Next to where they sell the tickets".
+    if tokens.get(after).is_some_and(|t| t.text == "where") {
+        all.push(spot(None, vec![purpose(&tokens[after..])], after + 1, rel.relation));
+    }
+    // "On three".
+    let storey = tokens.get(after).filter(|_| rel.relation == Relation::On).and_then(|t| number(&t.text));
+    all.extend(storey.and_then(floor).map(|f| spot(None, vec![f], after + 1, Relation::OnLevel)));
+    all
+}
+
+/// "Customer service, second floor".
+fn on_floor(tokens: &[Token], n: usize, noun: &Noun) -> Option<Spot> {
+    let before = |k: usize| noun.span.from.checked_sub(k).map(|b| &tokens[b]);
+    let told = |t: Option<&Token>| t.is_some_and(|t| t.class == Class::Prep);
+    let in_relation = told(before(1)) || before(1).is_some_and(|t| t.class == Class::Det) && told(before(2));
+    (noun.is_floor && !in_relation && noun.phrase.features.ordinal.is_some()).then(|| Spot {
+        relation: Relation::OnLevel,
+        rel: None,
+        noun: Some(n),
+        landmarks: vec![noun.phrase.clone()],
+        takes: noun.span,
+    })
+}
+
+fn floor(n: u32) -> Option<Phrase> {
+    let mut phrase = Phrase::new(Head::Named(Name::new("floor")?));
+    phrase.features.ordinal = Some(Ordinal::Nth(n));
+    Some(phrase)
+}
+
+/// What may lie at a spot, and is said of it.
+fn located(groups: &Groups, spot: &Spot, way: &[String], all: &mut Vec<Proposal>) {
+    for (f, figure) in groups.nouns.iter().enumerate() {
+        let Some(gap) = figure.span.gap(spot.takes) else { continue };
+        if gap > FAR || figure.pointer == Some(Pointer::There) || spot.landmarks.contains(&figure.phrase) {
+            continue;
+        }
+        let head = match figure.pointer {
+            Some(Pointer::Agent | Pointer::Speaker) => Phrase::new(Head::Here),
+            _ => figure.phrase.clone(),
+        };
+        let content = Content::Locate(Locate {
+            figure: head.clone(),
+            relation: spot.relation,
+            modifiers: Modifiers::default(),
+            landmarks: spot.landmarks.clone(),
+            frame: None,
+            repaired: false,
+        });
+        let boxed = || Box::new(content.clone());
+        let mut add = |kind, content| {
+            let (rel, other, takes) = (spot.rel, spot.noun, vec![spot.takes]);
+            all.push(Proposal { kind, content, noun: Some(f), other, rel, takes });
+        };
+        add(Kind::NotLocate, Content::Negate(boxed()));
+        add(Kind::MendLocate, Content::Correct { was: None, is: boxed() });
+        add(Kind::WayTo, Content::Route { steps: way.to_vec(), then: Some(boxed()) });
+        add(Kind::IsLocated, Content::Ask { kind: Question::Whether, about: About::Content(boxed()) });
+        if let [landmark] = &spot.landmarks[..] {
+            for quantity in [Quantity::All, Quantity::Usually, Quantity::Sometimes, Quantity::Never] {
+                let (figure, landmark) = (head.clone(), landmark.clone());
+                add(Kind::Generic, Content::Generic { figure, relation: spot.relation, landmark, quantity });
+            }
+        }
+        add(Kind::Locate, content);
+    }
+}
+
+fn after_articles(tokens: &[Token], mut at: usize) -> usize {
+    while tokens.get(at).is_some_and(|t| matches!(t.class, Class::Det | Class::Poss | Class::Point))
+        && at + 1 < tokens.len()
+    {
+        at += 1;
+    }
+    at
+}
+
+/// Some place, told by what is done there: the words behind "where", "to" or "for".
+fn purpose(tokens: &[Token]) -> Phrase {
+    let mut place = Phrase::new(Head::Place);
+    let tells = |t: &Token| matches!(t.text.as_str(), "where" | "for");
+    if let Some(at) = tokens.iter().position(tells) {
+        let is_word = |t: &&Token| !matches!(t.class, Class::Stop | Class::Comma | Class::Question);
+        let said: Vec<&str> = tokens[at + 1..].iter().take_while(is_word).map(|t| t.text.as_str()).collect();
+        place.features.purpose = (!said.is_empty()).then(|| said.join(" "));
+    }
+    place
+}
+
+/// A way, as the relations to landmarks that are said.
+fn steps(tokens: &[Token], groups: &Groups) -> Vec<String> {
+    let step = |r: &Rel| {
+        let at = after_articles(tokens, r.span.to);
+        let to = groups
+            .nouns
+            .iter()
+            .filter(|n| n.span.from == at && n.pointer.is_none())
+            .max_by_key(|n| n.span.to);
+        to.map(|n| format!("{} {}", r.relation.notation(), phrase_notation(&n.phrase)))
+    };
+    let steps: Vec<String> =
+        groups.rels.iter().filter(|r| r.longest && r.implied.is_none()).filter_map(step).collect();
+    if steps.is_empty() { vec!["ahead".to_owned()] } else { steps }
+}
+
+/// What is said of a name: the words behind its verb.
+fn value(tokens: &[Token], of: Span) -> String {
+    let ends = |t: &Token| matches!(t.class, Class::Stop | Class::Comma | Class::Question | Class::Conj);
+    let clause = tokens[of.to..].iter().take_while(|t| !ends(t));
+    let skips =
+        |t: &&Token| matches!(t.class, Class::Be | Class::Owner | Class::Adv | Class::Det | Class::Modal);
+    let words: Vec<&str> = clause.skip_while(skips).take(5).map(|t| t.text.as_str()).collect();
+    if words.is_empty() { "so".to_owned() } else { words.join(" ") }
+}

@@ -1,0 +1,49 @@
+use crate::language::reader::groups::groups;
+use crate::language::reader::judge::Judge;
+use crate::language::reader::kind::Kind;
+use crate::language::reader::lexicon::lexicon;
+use crate::language::reader::propose::propose;
+use crate::language::reader::tokens::{MAX_TOKENS, tokens};
+use crate::language::relation::Relation;
+use proptest::prelude::*;
+
+#[test]
+fn each_relation_of_the_lexicon_is_one() {
+    let lines = include_str!("../../../lexicon/english/relations.txt").lines();
+    for line in lines.filter(|l| !l.starts_with('#')) {
+        let (words, said) = line.split_once('=').expect(line);
+        let name = said.split_whitespace().next().expect(line);
+        assert!(Relation::ALL.iter().any(|r| r.notation() == name), "{line}");
+        assert!(!words.trim().is_empty(), "{line}");
+    }
+    assert!(lexicon().all_relations().len() > 300, "choices are taken apart");
+}
+
+#[test]
+fn contractions_and_owners_are_taken_apart() {
+    let words = |text: &str| tokens(text).into_iter().map(|t| t.text).collect::<Vec<_>>().join(" ");
+    assert_eq!(words("It's Nick's office, isn't it?"), "it is nick 's office , is not it ?");
+    assert_eq!(words("the R&D lab's um upstairs"), "the r_and_d lab 's upstairs");
+    assert_eq!(words("the students' lounge"), "the students 's lounge");
+}
+
+#[test]
+fn every_kind_is_proposed_and_learned() {
+    let all = tokens("no the gym on the second floor is next to the bar where we eat");
+    let kinds: Vec<Kind> = propose(&all, &groups(&all)).iter().map(|p| p.kind).collect();
+    for kind in Kind::ALL {
+        assert!(kinds.contains(&kind), "{kind:?} is never proposed");
+        assert!(Judge::learned().kinds().iter().any(|k| k.contains(&kind)), "{kind:?} was never said");
+    }
+}
+
+proptest! {
+    #[test]
+    fn any_text_has_bounded_proposals(text in "\\PC{0,400}") {
+        let all = tokens(&text);
+        prop_assert!(all.len() <= MAX_TOKENS + 2);
+        for p in propose(&all, &groups(&all)) {
+            prop_assert!(p.takes.iter().all(|s| s.from < s.to.max(1) && s.to <= all.len().max(1)));
+        }
+    }
+}

@@ -1,0 +1,137 @@
+//! What a text says: the grammar reads sentences word by word, the reader those that nobody foresaw.
+//!
+//! A sentence that the grammar reads whole says what it reads, unless the reader is sure of something else. Others
+//! say what the reader makes of them if that is likely enough: half understood is not understood.
+
+use crate::language::act::{Analysis, Content, Head, Parse, Phrase};
+use crate::language::grammar::ask::asked_name;
+use crate::language::grammar::cursor::Cursor;
+use crate::language::grammar::parse;
+use crate::language::grammar::sentence::{FILLERS, TAGS};
+use crate::language::lexicon::names::{Kind, Name};
+use crate::language::lexicon::normalise::{MAX_TEXT_BYTES, sentences};
+use crate::language::reader::read::{agree, analyses};
+use crate::language::reader::tokens::tokens;
+
+/// Analyses of a text that are kept.
+const ANALYSES_MAX: usize = 8;
+/// What states something is believed from so likely on …
+const BELIEVED: f64 = 0.6;
+/// … and what only asks from so likely: an answer harms less than a false name.
+const ANSWERED: f64 = 0.45;
+/// What names something that the lexicon takes for no place is believed from so likely on.
+const ODD: f64 = 0.8;
+/// So likely, another reading than the grammar's is preferred.
+const OVERRULED: f64 = 0.75;
+
+/// What a text says; no analyses if it is not understood or longer than
+/// [`MAX_TEXT_BYTES`](super::MAX_TEXT_BYTES). Linear in the text.
+pub fn parse(text: &str) -> Parse {
+    let exact = parse::parse(text);
+    if text.len() > MAX_TEXT_BYTES {
+        return exact;
+    }
+    let read = analyses(text);
+    let Some(best) = read.first() else { return exact };
+    if let Some(first) = exact.best() {
+        let is_aside = best.acts.is_empty() && !first.acts.iter().any(|a| a.content.asserts());
+        let overruled = best.weight > OVERRULED && !agree(&first.acts, &best.acts) && !is_aside;
+        return if overruled { said(text, read) } else { exact };
+    }
+    said(text, read)
+}
+
+/// What is likely enough to be heard.
+fn said(text: &str, read: Vec<Analysis>) -> Parse {
+    let foretold = foretells(text);
+    let enough = |a: &Analysis| {
+        let asserts = a.acts.iter().any(|act| act.content.asserts());
+        let least = match asserts {
+            true if foretold && a.acts.iter().any(|act| is_of_here(&act.content)) => f64::INFINITY,
+            true if a.acts.iter().all(|act| is_sensible(&act.content)) => BELIEVED,
+            true => ODD,
+            false => ANSWERED,
+        };
+        !a.acts.is_empty() && a.weight >= least
+    };
+    let heard = read.first().is_some_and(enough);
+    Parse {
+        analyses: if heard { read.into_iter().filter(|a| !a.acts.is_empty()).collect() } else { Vec::new() },
+    }
+}
+
+/// Whether it says what will be: that is nothing of here and now.
+fn foretells(text: &str) -> bool {
+    let words = tokens(text);
+    let is = |at: usize, word: &str| words.get(at).is_some_and(|t| t.text == word);
+    (0..words.len()).any(|at| is(at, "will") || is(at, "going") && is(at + 1, "to") && is(at + 2, "be"))
+}
+
+fn is_of_here(content: &Content) -> bool {
+    matches!(content, Content::Label { at, .. } if at.head == Head::Here)
+}
+
+/// Whether what is named may be a place: the lexicon knows of people, times and other things that are none.
+fn is_sensible(content: &Content) -> bool {
+    let is_place = |phrase: &Phrase| match &phrase.head {
+        Head::Named(name) => matches!(name.kind(), Kind::Place | Kind::Open),
+        _ => true,
+    };
+    let is_some = |phrase: &Phrase| phrase.full_name().is_none_or(|name| name.kind() != Kind::No);
+    match content {
+        Content::Label { what, .. } => is_place(what) && is_some(what),
+        Content::Same { like, .. } => is_place(like),
+        Content::Alias { what, also } => is_some(what) && is_some(also),
+        Content::Locate(locate) => is_some(&locate.figure),
+        Content::Attribute { what, .. } => is_place(what),
+        Content::Correct { is, .. } => is_sensible(is),
+        Content::Route { then: Some(then), .. } => is_sensible(then),
+        _ => true,
+    }
+}
+
+/// What is said, over all hearings of a recogniser: the text and its alternatives, each with its
+/// probability. The text is the likeliest hearing; analyses of several hearings that agree are one.
+pub fn parse_hearings(text: &str, alternatives: &[(String, f64)]) -> Parse {
+    let others: Vec<f64> =
+        alternatives.iter().map(|(_, p)| if p.is_finite() { p.clamp(0.0, 1.0) } else { 0.0 }).collect();
+    let most = others.iter().copied().fold(0.0, f64::max);
+    let first = (1.0 - others.iter().sum::<f64>()).max(most).max(f64::MIN_POSITIVE);
+    let sum = first + others.iter().sum::<f64>();
+    let hearings =
+        std::iter::once((text, first)).chain(alternatives.iter().map(|(t, _)| t.as_str()).zip(others));
+    let mut all: Vec<Analysis> = Vec::new();
+    for (k, (heard, p)) in hearings.enumerate() {
+        for mut analysis in parse(heard).analyses {
+            analysis.weight *= p / sum;
+            analysis.hearing = k;
+            match all.iter_mut().find(|a| a.notation == analysis.notation) {
+                Some(same) => same.weight += analysis.weight,
+                None => all.push(analysis),
+            }
+        }
+    }
+    // An order or a figure of speech says nothing: it yields to what says something.
+    let says = |a: &Analysis| !a.acts.iter().all(|act| matches!(act.content, Content::Ignored(_)));
+    all.sort_by(|a, b| {
+        says(b).cmp(&says(a)).then(b.weight.total_cmp(&a.weight)).then(a.hearing.cmp(&b.hearing))
+    });
+    all.truncate(ANALYSES_MAX);
+    Parse { analyses: all }
+}
+
+/// The name asked for by a question ("where is the gym?") or a bare name ("gym").
+pub fn parse_query(text: &str) -> Option<Name> {
+    for act in parse(text).acts() {
+        if let Some(name) = asked_name(&act.content) {
+            return Some(name);
+        }
+    }
+    let sentences = sentences(text);
+    let [only] = sentences.as_slice() else { return None };
+    let mut at = Cursor::new(&only.words);
+    at.skip(FILLERS);
+    let asked = at.noun_phrase()?;
+    at.skip(TAGS);
+    at.at_end().then(|| asked.name()).flatten()
+}
