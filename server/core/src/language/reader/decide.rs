@@ -4,7 +4,7 @@
 //! p(reading) = p(kinds | text) · Π p(groups | kind, text)
 //! ```
 
-use crate::language::reader::features::{Feature, Text};
+use crate::language::reader::features::{Feature, Text, distinct};
 use crate::language::reader::groups::{Groups, groups};
 use crate::language::reader::kind::Kind;
 use crate::language::reader::propose::{Proposal, propose};
@@ -49,8 +49,7 @@ impl Found {
     pub fn choices(&self, all_kinds: &[Kinds], weight: impl Fn(Feature) -> f64) -> Vec<Choice> {
         let text = Text::new(&self.tokens, &self.groups);
         let whole = text.whole();
-        let of = |k: usize| Text::of_kinds(&whole, &all_kinds[k], k).into_iter().map(&weight).sum::<f64>();
-        let kinds = normalised(&(0..all_kinds.len()).map(of).collect::<Vec<_>>());
+        let kinds = likely_kinds(&whole, all_kinds, &weight);
         let mut tried: Vec<(f64, usize)> = kinds.iter().copied().zip(0..).collect();
         tried.sort_by(|a, b| b.0.total_cmp(&a.0));
         tried.truncate(TRIED);
@@ -101,6 +100,18 @@ impl Found {
         let (a, b) = (&self.proposals[a], &self.proposals[b]);
         a.takes.iter().any(|s| b.takes.iter().any(|t| s.overlaps(*t)))
     }
+}
+
+/// p(kinds | text), as [`Text::of_kinds`] has their features; what kinds have in common is summed once.
+fn likely_kinds(whole: &[Feature], all_kinds: &[Kinds], weight: &impl Fn(Feature) -> f64) -> Vec<f64> {
+    let of_kind = Kind::ALL.map(|kind| Text::of_kind(whole, kind).map(weight).sum::<f64>());
+    let most = all_kinds.iter().map(Vec::len).max().unwrap_or(0);
+    let of_count: Vec<f64> = (0..=most).map(|n| Text::of_count(whole, n).map(weight).sum()).collect();
+    let log_odds = all_kinds.iter().enumerate().map(|(nth, kinds)| {
+        let each: f64 = distinct(kinds).map(|kind| of_kind[kind as usize]).sum();
+        each + of_count[kinds.len()] + Text::of_shape(whole, nth).map(weight).sum::<f64>()
+    });
+    normalised(&log_odds.collect::<Vec<_>>())
 }
 
 fn normalised(logs: &[f64]) -> Vec<f64> {

@@ -43,6 +43,11 @@ impl Hash {
     }
 }
 
+/// Each kind once.
+pub fn distinct(kinds: &[Kind]) -> impl Iterator<Item = Kind> {
+    kinds.iter().enumerate().filter(|(i, kind)| !kinds[..*i].contains(kind)).map(|(_, kind)| *kind)
+}
+
 /// A word of a closed class as it is, others by their class.
 fn tag(token: Option<&Token>) -> &str {
     match token {
@@ -251,17 +256,31 @@ impl<'a> Text<'a> {
         Hash(u64::from(feature) ^ 0x9e37_79b9_7f4a_7c15).num(outcome).byte((outcome >> 8) as u8).done()
     }
 
-    /// Features of the whole text for kinds of acts together: for each kind, for how many, and for all of them.
+    /// Features of the whole text for kinds of acts together: for each kind, for how many they are, and of its shape
+    /// for all of them, which are the nth that go together.
     pub fn of_kinds(whole: &[Feature], kinds: &[Kind], nth: usize) -> Vec<Feature> {
         let mut out = Vec::with_capacity(whole.len() * (kinds.len() + 2));
-        for (i, kind) in kinds.iter().enumerate() {
-            if !kinds[..i].contains(kind) {
-                out.extend(whole.iter().map(|&f| Self::of(f, 2000 + *kind as usize)));
-            }
+        for kind in distinct(kinds) {
+            out.extend(Self::of_kind(whole, kind));
         }
-        out.extend(whole.iter().map(|&f| Self::of(f, 3000 + kinds.len())));
-        out.extend(whole.iter().take(SHAPE).map(|&f| Self::of(f, nth)));
+        out.extend(Self::of_count(whole, kinds.len()));
+        out.extend(Self::of_shape(whole, nth));
         out
+    }
+
+    /// Those for one kind.
+    pub fn of_kind(whole: &[Feature], kind: Kind) -> impl Iterator<Item = Feature> {
+        whole.iter().map(move |&f| Self::of(f, 2000 + kind as usize))
+    }
+
+    /// Those for so many acts.
+    pub fn of_count(whole: &[Feature], count: usize) -> impl Iterator<Item = Feature> {
+        whole.iter().map(move |&f| Self::of(f, 3000 + count))
+    }
+
+    /// Those for all kinds together.
+    pub fn of_shape(whole: &[Feature], nth: usize) -> impl Iterator<Item = Feature> {
+        whole.iter().take(SHAPE).map(move |&f| Self::of(f, nth))
     }
 
     /// What lies around all of it: three words to either side, and its clause.

@@ -14,12 +14,16 @@ const UNIT: f32 = 1.0 / 32.0;
 /// Smaller weights, in steps, are left out: half of all, and none is missed.
 const LEAST: i8 = 2;
 
+const BUCKET_BITS: u32 = 16;
+
 /// What was learned.
 #[derive(Clone, Debug, Default)]
 pub struct Judge {
     kinds: Vec<Kinds>,
     features: Vec<Feature>,
     weights: Vec<i8>,
+    /// Where features begin whose first [`BUCKET_BITS`] bits are so much: hashes are spread evenly.
+    buckets: Vec<u32>,
 }
 
 impl Judge {
@@ -43,6 +47,9 @@ impl Judge {
             judge.features.push(u32::from_le_bytes([entry[0], entry[1], entry[2], entry[3]]));
             judge.weights.push(entry[4] as i8);
         }
+        let begins =
+            |bucket: u32| judge.features.partition_point(|f| f >> (32 - BUCKET_BITS) < bucket) as u32;
+        judge.buckets = (0..=1 << BUCKET_BITS).map(begins).collect();
         judge
     }
 
@@ -70,7 +77,10 @@ impl Judge {
 
     /// Weight of a feature.
     pub fn weight(&self, feature: Feature) -> f64 {
-        let steps = self.features.binary_search(&feature).map_or(0, |i| self.weights[i]);
+        let bucket = (feature >> (32 - BUCKET_BITS)) as usize;
+        let [Some(&from), Some(&to)] = [bucket, bucket + 1].map(|b| self.buckets.get(b)) else { return 0.0 };
+        let within = &self.features[from as usize..to as usize];
+        let steps = within.iter().position(|f| *f == feature).map_or(0, |i| self.weights[from as usize + i]);
         f64::from(steps) * f64::from(UNIT)
     }
 }

@@ -8,6 +8,7 @@ use std::sync::LazyLock;
 const CLASSES: &str = include_str!("../../../lexicon/english/classes.txt");
 const RELATIONS: &str = include_str!("../../../lexicon/english/relations.txt");
 const HEADS: &str = include_str!("../../../lexicon/english/heads.txt");
+const MISHEARD: &str = include_str!("../../../lexicon/english/misheard.txt");
 const CONTRACTIONS: &str = include_str!("../../../lexicon/english/contractions.txt");
 
 /// What a word is, whatever stands beside it.
@@ -164,6 +165,9 @@ impl Pointer {
     }
 }
 
+/// Words as they are heard, and as they were said.
+type Misheard = (Vec<&'static str>, Vec<&'static str>);
+
 /// All that is known of words.
 #[derive(Debug)]
 pub struct Lexicon {
@@ -172,6 +176,8 @@ pub struct Lexicon {
     relations: BTreeMap<String, Vec<Said>>,
     heads: HashSet<&'static str>,
     contractions: HashMap<&'static str, &'static str>,
+    /// By the first word of what is heard, longest first: what is heard, and what was said.
+    misheard: BTreeMap<&'static str, Vec<Misheard>>,
 }
 
 /// The lexicon, read once.
@@ -248,7 +254,15 @@ impl Lexicon {
             said.sort_by_key(|s| std::cmp::Reverse(s.words.len()));
         }
         let heads = HEADS.lines().filter(|l| !l.starts_with('#')).flat_map(|l| l.split(' ')).collect();
-        Self { classes, relations, heads, contractions: entries(CONTRACTIONS, '=').collect() }
+        let mut misheard: BTreeMap<&str, Vec<Misheard>> = BTreeMap::new();
+        for (heard, said) in entries(MISHEARD, '=') {
+            let [heard, said] = [heard, said].map(|words| words.split(' ').collect::<Vec<_>>());
+            misheard.entry(heard[0]).or_default().push((heard, said));
+        }
+        for all in misheard.values_mut() {
+            all.sort_by_key(|(heard, _)| std::cmp::Reverse(heard.len()));
+        }
+        Self { classes, relations, heads, contractions: entries(CONTRACTIONS, '=').collect(), misheard }
     }
 
     /// What a word is.
@@ -271,6 +285,14 @@ impl Lexicon {
     /// What a word is short for.
     pub fn contraction(&self, word: &str) -> Option<&'static str> {
         self.contractions.get(word).copied()
+    }
+
+    /// What was said where a recogniser heard these words first: how many of them, and for what.
+    pub fn misheard(&self, words: &[(String, bool)]) -> Option<(usize, &[&'static str])> {
+        let all = self.misheard.get(words.first()?.0.as_str())?;
+        let fits =
+            |heard: &[&str]| heard.len() <= words.len() && heard.iter().zip(words).all(|(h, (w, _))| h == w);
+        all.iter().find(|(heard, _)| fits(heard)).map(|(heard, said)| (heard.len(), said.as_slice()))
     }
 
     /// All relations, in a fixed order.

@@ -28,6 +28,17 @@ fn contractions_and_owners_are_taken_apart() {
 }
 
 #[test]
+fn what_was_misheard_is_what_was_said() {
+    let words = |text: &str| tokens(text).into_iter().map(|t| t.text).collect::<Vec<_>>().join(" ");
+    assert_eq!(words("their is a print her in hear"), "there is a printer in here");
+    assert_eq!(
+        words("the sever room is a cross from the work shop"),
+        "the server room is across from the workshop"
+    );
+    assert_eq!(words("there is a write of way"), "there is a write of way", "no word is mended by itself");
+}
+
+#[test]
 fn every_kind_is_proposed_and_learned() {
     let all = tokens("no the gym on the second floor is next to the bar where we eat");
     let kinds: Vec<Kind> = propose(&all, &groups(&all)).iter().map(|p| p.kind).collect();

@@ -44,11 +44,20 @@ pub fn tokens(text: &str) -> Vec<Token> {
         }
         at += 1;
     }
+    for (word, _) in &mut words {
+        *word = word.to_lowercase();
+    }
     let mut out: Vec<Token> = Vec::new();
-    for (word, capital) in words {
-        apart(&word.to_lowercase(), capital, &mut out);
-        if out.len() > MAX_TOKENS {
-            break;
+    let mut at = 0;
+    while at < words.len() && out.len() <= MAX_TOKENS {
+        if let Some((heard, said)) = lexicon().misheard(&words[at..]) {
+            for word in said {
+                apart(word, false, &mut out);
+            }
+            at += heard;
+        } else {
+            apart(&words[at].0, words[at].1, &mut out);
+            at += 1;
         }
     }
     let repeated = |a: &Token, b: &Token| a.text == b.text && a.text != "that" && !a.class.is_number();
