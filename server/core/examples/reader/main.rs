@@ -11,6 +11,7 @@ mod train;
 use lenient::{Act, acts, equal, same};
 use std::collections::BTreeMap;
 use std::path::Path;
+use toponym_core::language::HEARD;
 use toponym_core::language::reader::decide::{Found, Kinds};
 use toponym_core::language::reader::features::{Feature, Text};
 use toponym_core::language::reader::judge::Judge;
@@ -208,7 +209,10 @@ fn score(
             by.entry("kinds".to_owned()).or_default()[what] += 1;
         }
         let could = silent || s.gold.iter().any(|g| g.iter().all(|e| s.acts.iter().any(|a| equal(a, e))));
-        for k in [s.kind.clone(), "ALL".to_owned()] {
+        // As the reader is heard: not at all if it is not likely enough.
+        let heard = if best.probability < HEARD || got.is_empty() { usize::from(!silent) } else { what };
+        let kinds = [s.kind.as_str(), "ALL"].map(|k| [(k.to_owned(), what), (format!("heard {k}"), heard)]);
+        for (k, what) in kinds.into_iter().flatten() {
             let c = by.entry(k).or_default();
             c[what] += 1;
             c[3] += usize::from(could);
@@ -235,7 +239,7 @@ fn tell(by: &BTreeMap<String, Counts>, name: &str) {
         let n = (c[0] + c[1] + c[2]) as f64;
         let share = |x: usize| 100.0 * x as f64 / n;
         println!(
-            "{name:18} {k:10} n {n:4}  right {:5.1}  missed {:5.1}  wrong {:5.1}  could {:5.1}",
+            "{name:18} {k:16} n {n:4}  right {:5.1}  missed {:5.1}  wrong {:5.1}  could {:5.1}",
             share(c[0]),
             share(c[1]),
             share(c[2]),

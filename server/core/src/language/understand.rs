@@ -15,10 +15,8 @@ use crate::language::reader::tokens::tokens;
 
 /// Analyses of a text that are kept.
 const ANALYSES_MAX: usize = 8;
-/// What states something is believed from so likely on …
-const BELIEVED: f64 = 0.6;
-/// … and what only asks from so likely: an answer harms less than a false name.
-const ANSWERED: f64 = 0.45;
+/// What the reader makes of a text is heard from so likely on: likelier than not.
+pub const HEARD: f64 = 0.5;
 /// What names something that the lexicon takes for no place is believed from so likely on.
 const ODD: f64 = 0.8;
 /// So likely, another reading than the grammar's is preferred.
@@ -45,12 +43,11 @@ pub fn parse(text: &str) -> Parse {
 fn said(text: &str, read: Vec<Analysis>) -> Parse {
     let foretold = foretells(text);
     let enough = |a: &Analysis| {
-        let asserts = a.acts.iter().any(|act| act.content.asserts());
-        let least = match asserts {
-            true if foretold && a.acts.iter().any(|act| is_of_here(&act.content)) => f64::INFINITY,
-            true if a.acts.iter().all(|act| is_sensible(&act.content)) => BELIEVED,
-            true => ODD,
-            false => ANSWERED,
+        let any = |is: fn(&Content) -> bool| a.acts.iter().any(|act| is(&act.content));
+        let least = match () {
+            () if foretold && any(is_of_here) => f64::INFINITY,
+            () if any(is_odd) => ODD,
+            () => HEARD,
         };
         !a.acts.is_empty() && a.weight >= least
     };
@@ -71,7 +68,11 @@ fn is_of_here(content: &Content) -> bool {
     matches!(content, Content::Label { at, .. } if at.head == Head::Here)
 }
 
-/// Whether what is named may be a place: the lexicon knows of people, times and other things that are none.
+/// Whether what is named is hardly a place: the lexicon knows of people, times and other things that are none.
+fn is_odd(content: &Content) -> bool {
+    content.asserts() && !is_sensible(content)
+}
+
 fn is_sensible(content: &Content) -> bool {
     let is_place = |phrase: &Phrase| match &phrase.head {
         Head::Named(name) => matches!(name.kind(), Kind::Place | Kind::Open),
