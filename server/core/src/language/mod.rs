@@ -12,6 +12,8 @@
 //! readings ─ build, parse ─▶ analyses ─ notation, words ─▶ writing
 //! ```
 //!
+//! That is the grammar, which reads a sentence whole or not at all; [`reader`] reads others, `understand` weighs both.
+//!
 //! Examples of this crate measure it: `parse --score FILE` (sentences read exactly), `clauses FILE`
 //! (spatial clauses of route texts, [`clauses`]), `vocabulary FILE` (place words that the lexicon covers).
 

@@ -35,6 +35,7 @@ use crate::language::act::{
     About, Act, Content, Features, Frame, Head, Locate, Modifiers, Ordinal, Owner, Phrase, Quantity,
     Question, Reason, Restriction, Sameness, Unit,
 };
+use crate::language::lexicon::numbers::numbers_in_digits;
 
 /// The acts in writing; `none` if there is none.
 pub(super) fn notation(acts: &[Act]) -> String {
@@ -121,7 +122,7 @@ pub(super) fn relation_notation(r: &Restriction) -> String {
 
 pub(super) fn phrase_notation(phrase: &Phrase) -> String {
     let head = match &phrase.head {
-        Head::Named(name) => joined(&in_digits(name.as_str())),
+        Head::Named(name) => joined(&numbers_in_digits(name.as_str())),
         Head::Place => "place".to_owned(),
         Head::It => "it".to_owned(),
         Head::Here => "here".to_owned(),
@@ -186,62 +187,6 @@ fn braced(all: &[String]) -> String {
 
 fn joined(text: &str) -> String {
     text.replace(' ', "_")
-}
-
-/// A name with its numbers as they are written: "lecture hall one twenty three" is `lecture hall 123`.
-fn in_digits(name: &str) -> String {
-    const ONES: [&str; 21] = [
-        "zero",
-        "one",
-        "two",
-        "three",
-        "four",
-        "five",
-        "six",
-        "seven",
-        "eight",
-        "nine",
-        "ten",
-        "eleven",
-        "twelve",
-        "thirteen",
-        "fourteen",
-        "fifteen",
-        "sixteen",
-        "seventeen",
-        "eighteen",
-        "nineteen",
-        "oh",
-    ];
-    const TENS: [&str; 8] = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"];
-    let mut out: Vec<String> = Vec::new();
-    let (mut digits, mut tens) = (String::new(), false);
-    for word in name.split(' ') {
-        if let Some(one) = ONES.iter().position(|w| *w == word).map(|n| n % 20) {
-            if tens && (1..10).contains(&one) {
-                digits.pop();
-            }
-            digits.push_str(&one.to_string());
-            tens = false;
-        } else if let Some(ten) = TENS.iter().position(|w| *w == word) {
-            digits.push_str(&(10 * (ten + 2)).to_string());
-            tens = true;
-        } else {
-            // "Ward 7A".
-            let letter = if word.len() == 1 && !digits.is_empty() { word } else { "" };
-            if !digits.is_empty() {
-                out.push(std::mem::take(&mut digits) + letter);
-            }
-            tens = false;
-            if letter.is_empty() {
-                out.push(word.to_owned());
-            }
-        }
-    }
-    if !digits.is_empty() {
-        out.push(digits);
-    }
-    out.join(" ")
 }
 
 fn frame_notation(frame: Option<Frame>) -> &'static str {

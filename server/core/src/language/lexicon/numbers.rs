@@ -57,6 +57,25 @@ pub(crate) fn numbers_as_spoken(words: &[String]) -> Vec<String> {
     out
 }
 
+/// A name with its numbers in digits: "lecture hall one twenty three" is "lecture hall 123", "ward seven a" is "ward 7a".
+pub(crate) fn numbers_in_digits(name: &str) -> String {
+    let words: Vec<String> = name.split(' ').map(str::to_owned).collect();
+    let mut out: Vec<String> = Vec::with_capacity(words.len());
+    let mut at = 0;
+    while at < words.len() {
+        let (digits, end) = run(&words, at);
+        if end == at {
+            out.push(words[at].clone());
+            at += 1;
+            continue;
+        }
+        let letter = words.get(end).filter(|w| w.len() == 1);
+        out.push(digits + letter.map_or("", String::as_str));
+        at = end + usize::from(letter.is_some());
+    }
+    out.join(" ")
+}
+
 /// Digits of the numbers from `at` on, and one past the last word used.
 fn run(words: &[String], start: usize) -> (String, usize) {
     let mut digits = String::new();

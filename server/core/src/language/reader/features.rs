@@ -1,6 +1,7 @@
 //! What tells whether a proposal is said: hashes of words around its groups and of the whole text.
 
 use crate::language::act::Content;
+use crate::language::reader::chunks::{Chunk, chunks};
 use crate::language::reader::groups::{Groups, Noun, Span};
 use crate::language::reader::kind::Kind;
 use crate::language::reader::lexicon::{Class, lexicon};
@@ -77,45 +78,6 @@ pub struct Text<'a> {
     chunks: Vec<Chunk<'a>>,
 }
 
-/// Words that are one to the eye: a name, a relation, or a word.
-struct Chunk<'a> {
-    from: usize,
-    to: usize,
-    is: &'a str,
-}
-
-/// The text as chunks, articles left out.
-fn chunks<'a>(tokens: &'a [Token], groups: &Groups) -> Vec<Chunk<'a>> {
-    let mut all = Vec::new();
-    let mut at = 0;
-    while at < tokens.len() {
-        let from = at;
-        let rel = groups.rels.iter().filter(|r| r.longest && r.span.from == at).max_by_key(|r| r.span.to);
-        if let Some(r) = rel {
-            at = r.span.to;
-            all.push(Chunk { from, to: at, is: if r.implied.is_some() { "I" } else { "R" } });
-            continue;
-        }
-        if tokens[at].class.names() && tokens[at].class != Class::Verb {
-            while at < tokens.len()
-                && tokens[at].class.names()
-                && (tokens[at].class != Class::Verb
-                    || tokens.get(at + 1).is_some_and(|t| t.class == Class::Open))
-            {
-                at += 1;
-            }
-            let place = tokens[from..at].iter().any(|t| lexicon().is_head(&t.text));
-            all.push(Chunk { from, to: at, is: if place { "P" } else { "N" } });
-            continue;
-        }
-        at += 1;
-        if !matches!(tokens[from].class, Class::Det | Class::Poss) {
-            all.push(Chunk { from, to: at, is: &tokens[from].text });
-        }
-    }
-    all
-}
-
 impl<'a> Text<'a> {
     /// Of a text's words and groups.
     pub fn new(tokens: &'a [Token], groups: &'a Groups) -> Self {
@@ -151,9 +113,7 @@ impl<'a> Text<'a> {
         out.push(new("t123").str(tag(at(0))).str(tag(at(1))).str(tag(at(2))).done());
         out.push(new("t1234").str(tag(at(0))).str(tag(at(1))).str(tag(at(2))).str(tag(at(3))).done());
         out.push(new("end").str(word(tokens.last())).done());
-        let mut words = Vec::new();
-        std::mem::swap(&mut out, &mut words);
-        let shape = words;
+        let shape = std::mem::take(&mut out);
         for (i, t) in tokens.iter().enumerate() {
             let (before, next, after) = (i.checked_sub(1).and_then(at), at(i + 1), at(i + 2));
             out.push(new("w").str(&t.text).done());

@@ -2,6 +2,7 @@
 
 use crate::language::act::{Features, Head, Ordinal, Owner, Phrase};
 use crate::language::lexicon::names::Name;
+use crate::language::lexicon::numbers::counted;
 use crate::language::reader::lexicon::{Class, Implied, Pointer, lexicon};
 use crate::language::reader::tokens::Token;
 use crate::language::relation::Relation;
@@ -237,7 +238,7 @@ fn phrase(tokens: &[Token], span: Span, head: usize) -> Option<Phrase> {
     }
     // A floor is told by its number.
     let is_floor = from + 2 == span.to && matches!(tokens[from].text.as_str(), "floor" | "level");
-    if let Some(n) = number(&tokens[span.to - 1].text).filter(|_| is_floor) {
+    if let Some(n) = counted(&tokens[span.to - 1].text).filter(|_| is_floor) {
         features.ordinal = Some(Ordinal::Nth(n));
         text = "floor".into();
     }
@@ -260,34 +261,6 @@ fn ordinal(word: &str) -> Option<Ordinal> {
                 .map(Ordinal::Nth)
         }
     }
-}
-
-/// A number up to twenty, in words or digits.
-pub fn number(word: &str) -> Option<u32> {
-    const WORDS: [&str; 21] = [
-        "zero",
-        "one",
-        "two",
-        "three",
-        "four",
-        "five",
-        "six",
-        "seven",
-        "eight",
-        "nine",
-        "ten",
-        "eleven",
-        "twelve",
-        "thirteen",
-        "fourteen",
-        "fifteen",
-        "sixteen",
-        "seventeen",
-        "eighteen",
-        "nineteen",
-        "twenty",
-    ];
-    WORDS.iter().position(|w| *w == word).map(|n| n as u32).or_else(|| word.parse().ok())
 }
 
 fn rels(tokens: &[Token]) -> Vec<Rel> {

@@ -9,6 +9,7 @@
 //! What is read well counts although other words are not: an unread word is a feature of all that is proposed.
 //! The words are data (`server/core/lexicon`); the judge's weights are learned by the example `reader`.
 
+mod chunks;
 pub mod decide;
 pub mod features;
 pub mod groups;

@@ -4,8 +4,9 @@ use crate::language::act::{
     About, Content, Head, Locate, Modifiers, Ordinal, Phrase, Quantity, Question, Sameness,
 };
 use crate::language::lexicon::names::Name;
+use crate::language::lexicon::numbers::counted;
 use crate::language::notation::phrase_notation;
-use crate::language::reader::groups::{Groups, Noun, Rel, Span, number};
+use crate::language::reader::groups::{Groups, Noun, Rel, Span};
 use crate::language::reader::kind::Kind;
 use crate::language::reader::lexicon::{Class, Implied, Pointer};
 use crate::language::reader::tokens::Token;
@@ -164,7 +165,7 @@ fn spots(tokens: &[Token], groups: &Groups, r: usize, rel: &Rel) -> Vec<Spot> {
         all.push(spot(None, vec![purpose(&tokens[after..])], after + 1, rel.relation));
     }
     // "On three".
-    let storey = tokens.get(after).filter(|_| rel.relation == Relation::On).and_then(|t| number(&t.text));
+    let storey = tokens.get(after).filter(|_| rel.relation == Relation::On).and_then(|t| counted(&t.text));
     all.extend(storey.and_then(floor).map(|f| spot(None, vec![f], after + 1, Relation::OnLevel)));
     all
 }
