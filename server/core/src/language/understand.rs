@@ -32,8 +32,9 @@ pub fn parse(text: &str) -> Parse {
     let read = analyses(text);
     let Some(best) = read.first() else { return exact };
     if let Some(first) = exact.best() {
-        let is_aside = best.acts.is_empty() && !first.acts.iter().any(|a| a.content.asserts());
-        let overruled = best.weight > OVERRULED && !agree(&first.acts, &best.acts) && !is_aside;
+        // Silence overrules nothing: the judge is silent on names that it never met.
+        let says_else = !best.acts.is_empty() && !agree(&first.acts, &best.acts);
+        let overruled = best.weight > OVERRULED && says_else;
         return if overruled { said(text, read) } else { exact };
     }
     said(text, read)
