@@ -27,6 +27,16 @@ pub fn acts(reading: &str) -> Vec<Act> {
     split(reading, "&").iter().map(|s| act(s)).collect()
 }
 
+/// Words of an act in writing that another has, too, as a share of all.
+pub fn alike(a: &str, b: &str) -> f64 {
+    let words = |text: &str| -> std::collections::BTreeSet<String> {
+        let all = text.split(|c: char| !c.is_alphanumeric()).filter(|w| !w.is_empty());
+        all.map(|w| w.to_lowercase().trim_end_matches('s').to_owned()).collect()
+    };
+    let (a, b) = (words(a), words(b));
+    a.intersection(&b).count() as f64 / a.union(&b).count().max(1) as f64
+}
+
 /// Whether they say the same.
 pub fn same(a: &[Act], b: &[Act]) -> bool {
     let mut left: Vec<&Act> = b.iter().collect();
@@ -78,7 +88,8 @@ fn meet(a: &Head, b: &Head) -> bool {
     a.iter().any(|x| b.iter().any(|y| x == y || ends(x, y) || ends(y, x)))
 }
 
-fn split(text: &str, at: &str) -> Vec<String> {
+/// Parts of a text between a sign, outside brackets.
+pub fn split(text: &str, at: &str) -> Vec<String> {
     let (mut out, mut depth, mut now) = (Vec::new(), 0_i32, String::new());
     for c in text.chars() {
         match c {

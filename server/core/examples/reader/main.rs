@@ -1,26 +1,29 @@
 //! Teaches the reader's judge, and tells how well it reads.
 //!
-//! `reader train OUT FILE…` learns from sentences with readings and writes the judge; `reader cross FILE…` leaves
-//! out every other two sentences, then one file at a time, and tells what is read right; `reader lacks FILE…` tells
-//! of what is said and never proposed. `--show` shows each that is not read right.
+//! `reader train OUT FILE…` learns from our sentences and those of files, with their readings, and writes the judge.
+//! `reader cross FILE…` learns without every other two sentences of the files, then without one file at a time, and
+//! tells what is read right of those left out; `reader held FILE…` tells it of those of ours that are never learned
+//! from; `reader lacks FILE…` tells of what is said and never proposed. `--show` shows each that is not read right.
 
 mod lenient;
 mod made;
+mod score;
 mod train;
 
-use lenient::{Act, acts, equal, same};
-use std::collections::BTreeMap;
+use lenient::{Act, acts, equal, split};
 use std::path::Path;
-use toponym_core::language::HEARD;
-use toponym_core::language::reader::decide::{Found, Kinds};
-use toponym_core::language::reader::features::{Feature, Text};
+use toponym_core::language::reader::decide::Found;
 use toponym_core::language::reader::judge::Judge;
 use toponym_core::language::reader::kind::Kind;
-use train::{Learned, train};
+use toponym_core::language::reader::of_kinds::History;
+use train::train;
 
 /// Each of our templates is filled so often, and counts for so much of a sentence that somebody said.
-const MADE_TIMES: usize = 4;
+const MADE_TIMES: usize = 3;
 const MADE_WEIGHT: f32 = 0.3;
+/// More acts in one sentence are not learned from.
+const ACTS: usize = 4;
+
 /// A sentence and all readings of it that count.
 struct Sentence {
     text: String,
@@ -30,99 +33,109 @@ struct Sentence {
     first: String,
     found: Found,
     acts: Vec<Act>,
-    features: Vec<Vec<Feature>>,
-    whole: Vec<Feature>,
-    /// Kinds of the acts said.
-    kinds: Vec<Kinds>,
-    /// Of each act said, its kind and the proposals that are it.
-    groups: Vec<(Kind, Vec<usize>)>,
-    /// All proposals that are any of them.
+    /// Readings to learn.
+    readings: Vec<Vec<GoldAct>>,
+}
+
+/// An act that is said: its kind, all proposals of that kind, and those that are it.
+struct GoldAct {
+    kind: Kind,
+    proposals: Vec<usize>,
     right: Vec<usize>,
 }
 
+/// Our sentences, and those of them that are never learned from.
+const SAID: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/lexicon/english/said");
+const HELD: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/lexicon/english/said/held");
+
+/// Of a file: lines of JSON, `{"text": …, "kind": …, "parse": …, "also": […]}`.
 fn load(path: &str) -> Vec<Sentence> {
-    let lines = std::fs::read_to_string(path).expect(path);
+    let text = std::fs::read_to_string(path).expect(path);
+    let lines = text.lines().filter(|l| !l.trim().is_empty());
     lines
-        .lines()
-        .filter(|l| !l.trim().is_empty())
-        .map(|l| sentence(&serde_json::from_str(l).expect(l)))
+        .map(|l| {
+            let v: serde_json::Value = serde_json::from_str(l).expect(l);
+            let string = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_owned();
+            let also = v["also"].as_array().into_iter().flatten().map(string);
+            let kind = v["kind"].as_str().unwrap_or("all");
+            sentence(&string(&v["text"]), kind, std::iter::once(string(&v["parse"])).chain(also).collect())
+        })
         .collect()
 }
 
-/// Those of our own making, and the grammar's examples.
-fn made() -> Vec<Sentence> {
-    let golden = include_str!("../../src/language/golden.jsonl").lines();
-    let golden = golden.map(|l| sentence(&serde_json::from_str(l).expect(l)));
-    let filled = made::sentences(MADE_TIMES);
-    let filled =
-        filled.iter().map(|(text, parse)| sentence(&serde_json::json!({"text": text, "parse": parse})));
-    golden.chain(filled).map(|s| Sentence { weight: MADE_WEIGHT, ..s }).collect()
+/// Of a folder of ours: lines of text, kind, reading and other readings that count, with tabs between.
+fn said(folder: &str) -> Vec<Sentence> {
+    let mut paths: Vec<_> = std::fs::read_dir(folder).expect(folder).flatten().map(|e| e.path()).collect();
+    paths.sort();
+    let files = paths.iter().filter(|p| p.extension().is_some_and(|e| e == "tsv"));
+    let texts: Vec<String> = files.map(|p| std::fs::read_to_string(p).expect("a text")).collect();
+    let lines = texts.iter().flat_map(|t| t.lines()).map(|l| l.split('\t').collect::<Vec<_>>());
+    lines.map(|l| sentence(l[0], l[1], l[2..].iter().map(|r| (*r).to_owned()).collect())).collect()
 }
 
-fn sentence(v: &serde_json::Value) -> Sentence {
-    let text = v["text"].as_str().unwrap_or_default().to_owned();
-    let first = v["parse"].as_str().unwrap_or("none").to_owned();
-    let mut gold = vec![acts(&first)];
-    gold.extend(v["also"].as_array().into_iter().flatten().filter_map(|a| a.as_str()).map(acts));
-    let found = Found::new(&text);
-    let all: Vec<Act> = found
-        .proposals
-        .iter()
-        .map(|p| acts(&toponym_core::language::written(&p.content)).into_iter().next().unwrap_or(Act::Any))
-        .collect();
-    let can = |reading: &Vec<Act>| reading.iter().filter(|g| all.iter().any(|a| equal(g, a))).count();
-    // The reading that can be said whole, with the fewest acts; else the first.
-    let whole = gold.iter().enumerate().filter(|(_, r)| can(r) == r.len()).min_by_key(|(i, r)| (r.len(), *i));
-    let best = whole.or_else(|| gold.iter().enumerate().max_by_key(|(i, r)| (can(r), std::cmp::Reverse(*i))));
-    let best = best.map(|(_, r)| r.clone()).unwrap_or_default();
-    let mut groups: Vec<(Kind, Vec<usize>)> = Vec::new();
-    for g in &best {
-        let right: Vec<usize> = (0..all.len()).filter(|&p| equal(g, &all[p])).collect();
-        if let Some(&first) = right.first() {
-            groups.push((found.proposals[first].kind, right));
-        }
+/// All that we made: sentences, filled templates, and the grammar's examples.
+fn ours() -> Vec<Sentence> {
+    let golden = include_str!("../../src/language/golden.jsonl").lines().map(|l| {
+        let v: serde_json::Value = serde_json::from_str(l).expect(l);
+        (
+            v["text"].as_str().unwrap_or_default().to_owned(),
+            v["parse"].as_str().unwrap_or_default().to_owned(),
+        )
+    });
+    let golden = golden.map(|(text, parse)| sentence(&text, "golden", vec![parse]));
+    let templates = made::sentences(MADE_TIMES)
+        .into_iter()
+        .map(|(text, parse)| Sentence { weight: MADE_WEIGHT, ..sentence(&text, "made", vec![parse]) });
+    said(SAID).into_iter().chain(golden).chain(templates).collect()
+}
+
+/// A sentence with its readings.
+fn sentence(text: &str, kind: &str, raw: Vec<String>) -> Sentence {
+    let gold: Vec<Vec<Act>> = raw.iter().map(|r| acts(r)).collect();
+    let found = Found::new(text);
+    let written: Vec<String> =
+        found.proposals.iter().map(|p| toponym_core::language::written(&p.content)).collect();
+    let all: Vec<Act> = written.iter().map(|w| acts(w).into_iter().next().unwrap_or(Act::Any)).collect();
+    // All readings that can be said whole; if none can, those whose kinds are known.
+    let all_readings: Vec<Option<Vec<GoldAct>>> =
+        gold.iter().zip(&raw).map(|(g, raw)| reading(g, raw, &found, &all, &written)).collect();
+    let known = all_readings.into_iter().flatten().filter(|r| r.len() <= ACTS).collect::<Vec<_>>();
+    let whole = |r: &Vec<GoldAct>| r.iter().all(|a| !a.right.is_empty());
+    let some_whole = known.iter().any(whole);
+    let mut readings: Vec<Vec<GoldAct>> = known.into_iter().filter(|r| !some_whole || whole(r)).collect();
+    if !some_whole {
+        readings.truncate(1);
     }
-    // All readings that can be said whole are right; if none can, the first is.
-    let of = |g: &Vec<Act>| {
-        let mut kinds = g.iter().map(kind).collect::<Option<Kinds>>()?;
-        kinds.sort_unstable();
-        Some(kinds)
+    // The shortest is learned from whole, the others for how they begin.
+    readings.sort_by_key(Vec::len);
+    for reading in &mut readings {
+        let end = |a: &GoldAct| a.right.first().map_or(0, |&p| found.after(&History::default(), p).end);
+        reading.sort_by_key(end);
+    }
+    let first = raw.into_iter().next().unwrap_or_default();
+    let (text, kind) = (text.to_owned(), kind.to_owned());
+    Sentence { text, kind, weight: 1.0, gold, first, found, acts: all, readings }
+}
+
+/// A reading as proposals; none if nothing proposes acts of some kind.
+fn reading(gold: &[Act], raw: &str, found: &Found, all: &[Act], written: &[String]) -> Option<Vec<GoldAct>> {
+    let right: Vec<Vec<usize>> =
+        gold.iter().map(|g| (0..all.len()).filter(|&p| equal(g, &all[p])).collect()).collect();
+    let raw = split(raw, "&");
+    // Of those that are right those that say most of it: "ice machine", not "machine".
+    let best = |i: usize| -> Vec<usize> {
+        let alike = |p: &usize| lenient::alike(raw.get(i).map_or("", String::as_str), &written[*p]);
+        let most = right[i].iter().map(alike).fold(0.0, f64::max);
+        right[i].iter().copied().filter(|p| alike(p) >= most).collect()
     };
-    let mut kinds: Vec<Kinds> = gold.iter().filter(|g| can(g) == g.len()).filter_map(of).collect();
-    if kinds.is_empty() {
-        kinds.extend(of(&best));
-    }
-    kinds.sort();
-    kinds.dedup();
-    let right = groups.iter().flat_map(|(_, r)| r).copied().collect();
-    let reader = Text::new(&found.tokens, &found.groups);
-    let features = found
-        .proposals
-        .iter()
-        .map(|p| {
-            let mut f = Vec::new();
-            reader.features(p, &mut f);
-            f.sort_unstable();
-            f.dedup();
-            f
-        })
-        .collect();
-    let whole = reader.whole();
-    let group = v["kind"].as_str().map_or_else(|| "all".to_owned(), str::to_owned);
-    Sentence {
-        text,
-        kind: group,
-        weight: 1.0,
-        gold,
-        first,
-        found,
-        acts: all,
-        features,
-        whole,
-        kinds,
-        groups,
-        right,
-    }
+    let of = |(i, g): (usize, &Act)| {
+        let kind = kind(g)?;
+        let of_kind = (0..all.len()).filter(|&p| found.proposals[p].kind == kind);
+        let mine: Vec<usize> = best(i).into_iter().filter(|&p| found.proposals[p].kind == kind).collect();
+        let proposals = if mine.is_empty() { Vec::new() } else { of_kind.collect() };
+        Some(GoldAct { kind, proposals, right: mine })
+    };
+    gold.iter().enumerate().map(of).collect()
 }
 
 /// The kind of an act; none if nothing proposes such.
@@ -167,164 +180,33 @@ fn kind(act: &Act) -> Option<Kind> {
     })
 }
 
-/// Counts of right, missed, wrong, and of those that could be read.
-type Counts = [usize; 4];
-
-fn score(
-    all: &[&Sentence],
-    learned: &Learned,
-    show: bool,
-    by: &mut BTreeMap<String, Counts>,
-    bins: &mut Vec<(f64, bool)>,
-) {
-    for s in all {
-        let choices =
-            s.found.choices(&learned.kinds, |f| f64::from(*learned.weights.get(&f).unwrap_or(&0.0)));
-        let best = choices.first().cloned().unwrap_or_default();
-        let got: Vec<Act> = best.said.iter().map(|k| s.acts[*k].clone()).collect();
-        let silent = s.gold.iter().any(Vec::is_empty);
-        let right = s.gold.iter().any(|g| same(g, &got)) || silent && got.is_empty();
-        let part = |g: &Vec<Act>| got.len() < g.len() && got.iter().all(|a| g.iter().any(|e| equal(e, a)));
-        let less = got.is_empty() || s.gold.iter().any(part);
-        let what = if right {
-            0
-        } else if less {
-            1
-        } else {
-            2
-        };
-        bins.push((best.probability, right));
-        let mut got_kinds: Kinds = best.said.iter().map(|&k| s.found.proposals[k].kind).collect();
-        got_kinds.sort_unstable();
-        let of = |g: &Vec<Act>| {
-            g.iter().map(kind).collect::<Option<Kinds>>().map(|mut k| {
-                k.sort_unstable();
-                k
-            })
-        };
-        let kinds_right = s.gold.iter().any(|g| of(g).as_ref() == Some(&got_kinds));
-        if !right && kinds_right {
-            by.entry("groups".to_owned()).or_default()[what] += 1;
-        } else if !right {
-            by.entry("kinds".to_owned()).or_default()[what] += 1;
-        }
-        let could = silent || s.gold.iter().any(|g| g.iter().all(|e| s.acts.iter().any(|a| equal(a, e))));
-        // As the reader is heard: not at all if it is not likely enough.
-        let heard = if best.probability < HEARD || got.is_empty() { usize::from(!silent) } else { what };
-        let kinds = [s.kind.as_str(), "ALL"].map(|k| [(k.to_owned(), what), (format!("heard {k}"), heard)]);
-        for (k, what) in kinds.into_iter().flatten() {
-            let c = by.entry(k).or_default();
-            c[what] += 1;
-            c[3] += usize::from(could);
-        }
-        if show && what > 0 {
-            let written = |k: &usize| toponym_core::language::written(&s.found.proposals[*k].content);
-            let got: Vec<String> = best.said.iter().map(written).collect();
-            let cannot = if could { "" } else { "CAN'T " };
-            println!(
-                "{} {cannot}{}{:?}\n     want {}\n     got  {} {:.2}",
-                ["", "missed", "wrong"][what],
-                if kinds_right { "GROUPS " } else { "KINDS " },
-                s.text,
-                s.first,
-                got.join(" & "),
-                best.probability
-            );
-        }
-    }
-}
-
-fn tell(by: &BTreeMap<String, Counts>, name: &str) {
-    for (k, c) in by {
-        let n = (c[0] + c[1] + c[2]) as f64;
-        let share = |x: usize| 100.0 * x as f64 / n;
-        println!(
-            "{name:18} {k:16} n {n:4}  right {:5.1}  missed {:5.1}  wrong {:5.1}  could {:5.1}",
-            share(c[0]),
-            share(c[1]),
-            share(c[2]),
-            share(c[3])
-        );
-    }
-}
-
-/// Means of probability and of right, in five bins of equal count.
-fn tell_certainty(mut bins: Vec<(f64, bool)>) {
-    bins.sort_by(|a, b| a.0.total_cmp(&b.0));
-    for bin in bins.chunks(bins.len().div_ceil(5).max(1)) {
-        let n = bin.len() as f64;
-        let said = bin.iter().map(|b| b.0).sum::<f64>() / n;
-        let right = bin.iter().filter(|b| b.1).count() as f64 / n;
-        println!("certainty {said:.3}  right {right:.3}");
-    }
-}
-
 fn main() {
     let mut args: Vec<String> = std::env::args().skip(1).collect();
     let show = args.iter().any(|a| a == "--show");
     args.retain(|a| a != "--show");
     let Some((mode, files)) = args.split_first() else {
-        return eprintln!("train OUT FILE…, cross FILE… or lacks FILE…");
+        return eprintln!("train OUT FILE…, cross FILE…, held FILE… or lacks FILE…");
     };
     let (out, files) = if mode == "train" { files.split_at(1) } else { (&[][..], files) };
-    let short =
-        |f: &str| Path::new(f).file_stem().map_or(String::new(), |n| n.to_string_lossy().into_owned());
-    let sets: Vec<(String, Vec<Sentence>)> = files.iter().map(|f| (short(f), load(f))).collect();
-    let made = made();
+    let name =
+        |f: &String| Path::new(f).file_stem().map_or(String::new(), |n| n.to_string_lossy().into_owned());
+    let sets: Vec<(String, Vec<Sentence>)> = files.iter().map(|f| (name(f), load(f))).collect();
+    let theirs = || sets.iter().flat_map(|(_, s)| s);
     match mode.as_str() {
         "train" => {
-            let all: Vec<&Sentence> = sets.iter().flat_map(|(_, s)| s).chain(&made).collect();
-            let learned = train(&all);
-            let weights: Vec<(Feature, f32)> = learned.weights.into_iter().collect();
-            std::fs::write(&out[0], Judge::written(&learned.kinds, &weights)).expect("written");
+            let ours = ours();
+            let all: Vec<&Sentence> = theirs().chain(&ours).collect();
+            std::fs::write(&out[0], Judge::written(&train(&all))).expect("written");
         }
-        "lacks" => {
-            for s in sets.iter().flat_map(|(_, s)| s) {
-                let can = |g: &Vec<Act>| g.iter().all(|e| s.acts.iter().any(|a| equal(a, e)));
-                if !s.gold.iter().any(|g| g.is_empty() || can(g)) {
-                    let never = s.gold[0].iter().filter(|e| !s.acts.iter().any(|a| equal(a, e)));
-                    println!("{}\n    {}\n    {:?}", s.text, s.first, never.collect::<Vec<_>>());
-                }
-            }
+        "held" => {
+            let ours = ours();
+            let (learn, held) = (theirs().chain(&ours).collect::<Vec<_>>(), said(HELD));
+            score::told(&[("held".to_owned(), learn, held.iter().collect())], show, true);
         }
-        "cross" => {
-            // Halves of each file by turns, as those that are held; then whole files.
-            let (mut by, mut bins) = (BTreeMap::new(), Vec::new());
-            for fold in 0..2 {
-                let is_part = |i: usize, want: bool| (i / 2 % 2 == fold) == want;
-                let part = |want: bool| {
-                    let of = |s: &'_ (String, Vec<Sentence>)| -> Vec<usize> {
-                        (0..s.1.len()).filter(|&i| is_part(i, want)).collect()
-                    };
-                    sets.iter()
-                        .flat_map(|s| of(s).into_iter().map(|i| &s.1[i]).collect::<Vec<_>>())
-                        .collect::<Vec<_>>()
-                };
-                let learn: Vec<&Sentence> = part(false).into_iter().chain(&made).collect();
-                score(&part(true), &train(&learn), show, &mut by, &mut bins);
-            }
-            tell(&by, "halves");
-            tell_certainty(bins);
-            let (mut all, mut bins) = (BTreeMap::new(), Vec::new());
-            for (i, (name, set)) in sets.iter().enumerate().filter(|(_, (n, _))| n.contains("dev")) {
-                let rest = sets
-                    .iter()
-                    .enumerate()
-                    .filter(|(k, _)| *k != i)
-                    .flat_map(|(_, (_, s))| s)
-                    .chain(&made)
-                    .collect::<Vec<_>>();
-                let mut by = BTreeMap::new();
-                let learned = train(&rest);
-                score(&set.iter().collect::<Vec<_>>(), &learned, false, &mut by, &mut bins);
-                tell(&by, name);
-                let sum: Counts = by["ALL"];
-                let c: &mut Counts = all.entry("ALL".to_owned()).or_default();
-                (0..4).for_each(|k| c[k] += sum[k]);
-            }
-            tell(&all, "writers");
-            tell_certainty(bins);
-        }
-        _ => println!("no such mode"),
+        "cross" => score::cross(&sets, &ours(), show),
+        "lacks" => theirs()
+            .filter(|s| s.readings.iter().all(|r| r.iter().any(|a| a.right.is_empty())))
+            .for_each(|s| println!("{}\n    {}", s.text, s.first)),
+        _ => eprintln!("no such mode: {mode}"),
     }
 }

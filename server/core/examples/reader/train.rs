@@ -1,114 +1,184 @@
-//! What the judge learns: which kinds of acts a text has, and which proposal each of them is.
+//! What the judge learns: of what kind the next act is, and which proposal it is.
 
 use crate::Sentence;
-use std::collections::{BTreeMap, HashMap};
-use toponym_core::language::reader::decide::Kinds;
+use std::collections::HashMap;
 use toponym_core::language::reader::features::{Feature, Text};
+use toponym_core::language::reader::judge::{Row, Weights};
+use toponym_core::language::reader::kind::{KINDS, Kind};
+use toponym_core::language::reader::of_kinds::History;
 
 /// Of the descent: step, decay of weights, rounds. Chosen by halves of the sentences.
 const RATE: f32 = 0.05;
 const DECAY: f32 = 1e-2;
 const ROUNDS: usize = 10;
+/// Features of fewer choices are left out: they tell of one sentence only.
+const SEEN: u32 = 8;
+/// Smaller slopes change nothing.
+const LEAST: f32 = 1e-3;
 
-/// What is learned: kinds that go together, and weights.
-pub struct Learned {
-    pub kinds: Vec<Kinds>,
-    pub weights: HashMap<Feature, f32>,
-}
-
-/// One choice among outcomes, each with its features; those that are right.
-struct Choosing {
+/// Which kind is next; any of some is right.
+struct KindChoice {
     weight: f32,
-    outcomes: Vec<Vec<u32>>,
-    right: Vec<usize>,
+    features: Vec<u32>,
+    right: [bool; KINDS],
 }
 
-/// Multinomial logistic regression by AdaGrad: of the outcomes some are right, −log of their sum is the loss.
-pub fn train(sentences: &[&Sentence]) -> Learned {
-    let mut counts: BTreeMap<Kinds, usize> = BTreeMap::new();
-    for s in sentences {
-        for k in &s.kinds {
-            *counts.entry(k.clone()).or_default() += 1;
-        }
-    }
-    let kinds: Vec<Kinds> = counts.into_iter().filter(|(_, n)| *n >= 2).map(|(k, _)| k).take(250).collect();
-    let mut index: HashMap<Feature, u32> = HashMap::new();
-    let mut seen: HashMap<Feature, u32> = HashMap::new();
-    for s in sentences {
-        for f in s.whole.iter().chain(s.features.iter().flatten()) {
-            *seen.entry(*f).or_default() += 1;
-        }
-    }
-    let of = |f: Feature, n: u32, index: &mut HashMap<Feature, u32>| -> Option<u32> {
-        let next = index.len() as u32;
-        (n > 1).then(|| *index.entry(f).or_insert(next))
-    };
-    let mut choosing: Vec<Choosing> = Vec::new();
-    for s in sentences {
-        let right: Vec<usize> = (0..kinds.len()).filter(|&k| s.kinds.contains(&kinds[k])).collect();
-        if !right.is_empty() {
-            let outcomes = (0..kinds.len())
-                .map(|k| {
-                    // Rare words tell of one text only.
-                    let known: Vec<Feature> = s.whole.iter().copied().filter(|f| seen[f] > 1).collect();
-                    let all = Text::of_kinds(&known, &kinds[k], k);
-                    all.into_iter().filter_map(|f| of(f, 2, &mut index)).collect()
-                })
-                .collect();
-            choosing.push(Choosing { weight: s.weight, outcomes, right });
-        }
-        for (kind, right) in &s.groups {
-            let all: Vec<usize> = (0..s.found.proposals.len())
-                .filter(|&p| {
-                    s.found.proposals[p].kind == *kind && (right.contains(&p) || !s.right.contains(&p))
-                })
-                .collect();
-            if all.len() < 2 {
-                continue;
+/// Which proposal is next; any of some is right.
+struct GroupChoice {
+    weight: f32,
+    outcomes: Vec<(Vec<u32>, bool)>,
+}
+
+/// Features as indices of weights.
+#[derive(Default)]
+struct Index {
+    of: HashMap<Feature, u32>,
+    seen: Vec<u32>,
+}
+
+impl Index {
+    fn all(&mut self, features: &[Feature]) -> Vec<u32> {
+        let index = |f: &Feature| {
+            let next = self.of.len() as u32;
+            let k = *self.of.entry(*f).or_insert(next);
+            if k == next {
+                self.seen.push(0);
             }
-            let outcomes = all
-                .iter()
-                .map(|&p| s.features[p].iter().filter_map(|&f| of(f, seen[&f], &mut index)).collect())
-                .collect();
-            let right = (0..all.len()).filter(|&i| right.contains(&all[i])).collect();
-            choosing.push(Choosing { weight: s.weight, outcomes, right });
-        }
+            self.seen[k as usize] += 1;
+            k
+        };
+        features.iter().map(index).collect()
     }
-    let weights = descend(&choosing, index.len());
-    Learned { kinds, weights: index.into_iter().map(|(f, k)| (f, weights[k as usize])).collect() }
+
+    fn prune(&self, features: &mut Vec<u32>) {
+        features.retain(|k| self.seen[*k as usize] >= SEEN);
+    }
 }
 
-fn descend(choosing: &[Choosing], n: usize) -> Vec<f32> {
-    let mut w = vec![0_f32; n];
-    let mut squares = vec![0.1_f32; n];
-    let mut order: Vec<usize> = (0..choosing.len()).collect();
+/// Multinomial logistic regressions by AdaGrad: of the outcomes some are right, −log of their sum is the loss.
+pub fn train(sentences: &[&Sentence]) -> Weights {
+    let (mut of_kinds, mut of_groups) = (Index::default(), Index::default());
+    let (mut kinds, mut groups) = (Vec::new(), Vec::new());
+    for s in sentences {
+        choices(s, &mut of_kinds, &mut of_groups, &mut kinds, &mut groups);
+    }
+    for choice in &mut kinds {
+        of_kinds.prune(&mut choice.features);
+    }
+    for (features, _) in groups.iter_mut().flat_map(|c: &mut GroupChoice| &mut c.outcomes) {
+        of_groups.prune(features);
+    }
+    let rows = descend_kinds(&kinds, of_kinds.of.len());
+    let weights = descend_groups(&groups, of_groups.of.len());
+    Weights {
+        kinds: of_kinds.of.into_iter().map(|(f, k)| (f, rows[k as usize])).collect(),
+        groups: of_groups.of.into_iter().map(|(f, k)| (f, weights[k as usize])).collect(),
+    }
+}
+
+/// All choices of a sentence: act by act, and that there is no more.
+fn choices(
+    s: &Sentence,
+    of_kinds: &mut Index,
+    of_groups: &mut Index,
+    kinds: &mut Vec<KindChoice>,
+    groups: &mut Vec<GroupChoice>,
+) {
+    let text = Text::new(&s.found.tokens, &s.found.groups);
+    let mut history = History::default();
+    let Some(reading) = s.readings.first() else { return };
+    let mut features = Vec::new();
+    for n in 0..=reading.len() {
+        let mut right = [false; KINDS];
+        right[reading.get(n).map_or(Kind::Nothing, |a| a.kind) as usize] = true;
+        if n == 0 {
+            let firsts = s.readings.iter().map(|r| r.first().map_or(Kind::Nothing, |a| a.kind));
+            firsts.for_each(|kind| right[kind as usize] = true);
+        }
+        kinds.push(KindChoice { weight: s.weight, features: of_kinds.all(&text.next_kind(&history)), right });
+        let Some(act) = reading.get(n) else { break };
+        // What can't be proposed tells of its kind alone, and nothing of what comes after it.
+        let Some(&said) = act.right.iter().find(|p| !s.found.is_said(&history, **p)) else { break };
+        let mut outcomes = Vec::new();
+        for &p in act.proposals.iter().filter(|p| !s.found.is_said(&history, **p)) {
+            let proposal = &s.found.proposals[p];
+            text.features(proposal, &mut features);
+            features.extend(text.next_groups(proposal, &history));
+            outcomes.push((of_groups.all(&features), act.right.contains(&p)));
+        }
+        if outcomes.len() > 1 {
+            groups.push(GroupChoice { weight: s.weight, outcomes });
+        }
+        history = s.found.after(&history, said);
+    }
+}
+
+/// A die that falls alike each time.
+fn shuffle<T>(all: &mut [T], seed: &mut u64) {
+    for i in (1..all.len()).rev() {
+        *seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        all.swap(i, ((*seed >> 33) as usize) % (i + 1));
+    }
+}
+
+/// Slopes of −log Σ p(right) by the log-odds of the outcomes.
+fn slopes(z: &[f32], right: impl Fn(usize) -> bool) -> Vec<f32> {
+    let most = z.iter().copied().fold(f32::NEG_INFINITY, f32::max);
+    let e: Vec<f32> = z.iter().map(|z| (z - most).exp()).collect();
+    let sum: f32 = e.iter().sum();
+    let sum_right: f32 = (0..e.len()).filter(|&o| right(o)).map(|o| e[o]).sum();
+    let target = |o: usize| if right(o) { e[o] / sum_right.max(1e-20) } else { 0.0 };
+    (0..e.len()).map(|o| e[o] / sum - target(o)).collect()
+}
+
+fn step(weight: &mut f32, square: &mut f32, slope: f32) {
+    let g = slope + DECAY * *weight;
+    *square += g * g;
+    *weight -= RATE * g / square.sqrt();
+}
+
+fn descend_kinds(choices: &[KindChoice], n: usize) -> Vec<Row> {
+    let (mut weights, mut squares) = (vec![[0.0_f32; KINDS]; n], vec![[0.1_f32; KINDS]; n]);
+    let mut order: Vec<&KindChoice> = choices.iter().collect();
     let mut seed = 12345_u64;
     for _ in 0..ROUNDS {
-        for i in (1..order.len()).rev() {
-            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            order.swap(i, ((seed >> 33) as usize) % (i + 1));
-        }
-        for &i in &order {
-            let c = &choosing[i];
-            let z: Vec<f32> = c.outcomes.iter().map(|o| o.iter().map(|&k| w[k as usize]).sum()).collect();
-            let most = z.iter().copied().fold(f32::NEG_INFINITY, f32::max);
-            let e: Vec<f32> = z.iter().map(|z| (z - most).exp()).collect();
-            let sum: f32 = e.iter().sum();
-            let right: f32 = c.right.iter().map(|&r| e[r]).sum();
-            for (o, features) in c.outcomes.iter().enumerate() {
-                let target = if c.right.contains(&o) { e[o] / right.max(1e-20) } else { 0.0 };
-                let g = c.weight * (e[o] / sum - target);
-                if g.abs() < 1e-3 {
-                    continue;
-                }
-                for &k in features {
-                    let k = k as usize;
-                    let gk = g + DECAY * w[k];
-                    squares[k] += gk * gk;
-                    w[k] -= RATE * gk / squares[k].sqrt();
+        shuffle(&mut order, &mut seed);
+        for c in &order {
+            let mut z = [0.0_f32; KINDS];
+            for &k in &c.features {
+                z.iter_mut().zip(&weights[k as usize]).for_each(|(z, w)| *z += w);
+            }
+            for (kind, slope) in slopes(&z, |o| c.right[o]).into_iter().enumerate() {
+                let slope = c.weight * slope;
+                if slope.abs() >= LEAST {
+                    for &k in &c.features {
+                        step(&mut weights[k as usize][kind], &mut squares[k as usize][kind], slope);
+                    }
                 }
             }
         }
     }
-    w
+    weights
+}
+
+fn descend_groups(choices: &[GroupChoice], n: usize) -> Vec<f32> {
+    let (mut weights, mut squares) = (vec![0.0_f32; n], vec![0.1_f32; n]);
+    let mut order: Vec<&GroupChoice> = choices.iter().collect();
+    let mut seed = 54321_u64;
+    for _ in 0..ROUNDS {
+        shuffle(&mut order, &mut seed);
+        for c in &order {
+            let z: Vec<f32> =
+                c.outcomes.iter().map(|(f, _)| f.iter().map(|&k| weights[k as usize]).sum()).collect();
+            for ((features, _), slope) in c.outcomes.iter().zip(slopes(&z, |o| c.outcomes[o].1)) {
+                let slope = c.weight * slope;
+                if slope.abs() >= LEAST {
+                    for &k in features {
+                        step(&mut weights[k as usize], &mut squares[k as usize], slope);
+                    }
+                }
+            }
+        }
+    }
+    weights
 }

@@ -45,7 +45,7 @@ pub use lexicon::names::Name;
 pub use lexicon::normalise::MAX_TEXT_BYTES;
 pub use reference::{pointed_to, resolve_it, seen_from_here, topic};
 pub use relation::Relation;
-pub use understand::{HEARD, parse, parse_hearings, parse_query};
+pub use understand::{parse, parse_by, parse_hearings, parse_query};
 pub use words::{NOT_UNDERSTOOD, words};
 
 /// An act in writing.

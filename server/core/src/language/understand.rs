@@ -10,6 +10,7 @@ use crate::language::grammar::parse;
 use crate::language::grammar::sentence::{FILLERS, TAGS};
 use crate::language::lexicon::names::{Kind, Name};
 use crate::language::lexicon::normalise::{MAX_TEXT_BYTES, sentences};
+use crate::language::reader::judge::Judge;
 use crate::language::reader::read::{agree, analyses};
 use crate::language::reader::tokens::tokens;
 
@@ -18,18 +19,23 @@ const ANALYSES_MAX: usize = 8;
 /// What the reader makes of a text is heard from so likely on: likelier than not.
 pub const HEARD: f64 = 0.5;
 /// What names something that the lexicon takes for no place is believed from so likely on.
-const ODD: f64 = 0.8;
+const ODD: f64 = 0.9;
 /// So likely, another reading than the grammar's is preferred.
-const OVERRULED: f64 = 0.75;
+const OVERRULED: f64 = 0.6;
 
 /// What a text says; no analyses if it is not understood or longer than
 /// [`MAX_TEXT_BYTES`](super::MAX_TEXT_BYTES). Linear in the text.
 pub fn parse(text: &str) -> Parse {
+    parse_by(text, Judge::learned())
+}
+
+/// As [`parse`], by another judge.
+pub fn parse_by(text: &str, judge: &Judge) -> Parse {
     let exact = parse::parse(text);
     if text.len() > MAX_TEXT_BYTES {
         return exact;
     }
-    let read = analyses(text);
+    let read = analyses(text, judge);
     let Some(best) = read.first() else { return exact };
     if let Some(first) = exact.best() {
         // Silence overrules nothing: the judge is silent on names that it never met.

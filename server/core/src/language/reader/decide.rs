@@ -1,20 +1,25 @@
-//! From proposals to readings: what kinds of acts a text has, by all of its words, and which groups are theirs.
+//! From proposals to readings, act by act: of what kind the next is, if there is one, and which groups are its.
 //!
 //! ```text
-//! p(reading) = p(kinds | text) · Π p(groups | kind, text)
+//! p(reading | text) = Π p(kind | text, said before) · p(groups | kind, text, said before)
 //! ```
 
-use crate::language::reader::features::{Feature, Text, distinct};
+use crate::language::reader::features::Text;
 use crate::language::reader::groups::{Groups, groups};
-use crate::language::reader::kind::Kind;
+use crate::language::reader::judge::Judge;
+use crate::language::reader::kind::{KINDS, Kind};
+use crate::language::reader::of_kinds::History;
 use crate::language::reader::propose::{Proposal, propose};
 use crate::language::reader::tokens::{Token, tokens};
 
-/// Kinds that one text has, sorted.
-pub type Kinds = Vec<Kind>;
-
-/// Kinds that are filled in for a text.
-const TRIED: usize = 8;
+/// Beginnings of readings that are followed.
+const FOLLOWED: usize = 16;
+/// A kind, a proposal or a beginning that is less likely is not followed.
+const LEAST: f64 = 0.004;
+/// Proposals of a kind that are followed.
+const OPTIONS: usize = 5;
+/// More acts are not read.
+const ACTS: usize = 6;
 
 /// All that was found in a text.
 #[derive(Clone, Debug, Default)]
@@ -45,73 +50,127 @@ impl Found {
         Self { tokens, groups, proposals }
     }
 
-    /// Readings, likeliest first, by the weight of a feature.
-    pub fn choices(&self, all_kinds: &[Kinds], weight: impl Fn(Feature) -> f64) -> Vec<Choice> {
+    /// Readings, likeliest first.
+    pub fn choices(&self, judge: &Judge) -> Vec<Choice> {
         let text = Text::new(&self.tokens, &self.groups);
-        let whole = text.whole();
-        let kinds = likely_kinds(&whole, all_kinds, &weight);
-        let mut tried: Vec<(f64, usize)> = kinds.iter().copied().zip(0..).collect();
-        tried.sort_by(|a, b| b.0.total_cmp(&a.0));
-        tried.truncate(TRIED);
-        let mut ranked: Vec<(Kind, Vec<(f64, usize)>)> = Vec::new();
-        let mut choices: Vec<Choice> = Vec::new();
-        for (p_kinds, k) in tried {
-            let mut choice = Choice { probability: p_kinds, said: Vec::new() };
-            for kind in &all_kinds[k] {
-                let at = ranked.iter().position(|(r, _)| r == kind).unwrap_or_else(|| {
-                    ranked.push((*kind, self.ranked(&text, *kind, &weight)));
-                    ranked.len() - 1
-                });
-                let free = |p: usize| choice.said.iter().all(|&s| !self.clash(s, p));
-                match ranked[at].1.iter().find(|(_, p)| free(*p)) {
-                    Some(&(q, p)) => {
-                        choice.probability *= q;
-                        choice.said.push(p);
+        let mut weighed = Weighed { found: self, text: &text, judge, of_kind: vec![None; KINDS] };
+        let mut choices: Vec<(f64, Choice)> = Vec::new();
+        let mut open = vec![(1.0, History::default())];
+        while !open.is_empty() {
+            let mut longer: Vec<(f64, History)> = Vec::new();
+            for (p, history) in open {
+                for (kind, p_kind) in Kind::ALL.into_iter().zip(weighed.kinds(&history)) {
+                    let p = p * p_kind;
+                    if kind == Kind::Nothing {
+                        self.close(p, &history, &mut choices);
+                    } else if p > LEAST && history.said.len() < ACTS {
+                        let options = weighed.options(&history, kind).into_iter();
+                        let likely = options.map(|(q, next)| (p * q, next)).filter(|(p, _)| *p > LEAST);
+                        longer.extend(likely.take(OPTIONS).map(|(p, next)| (p, self.after(&history, next))));
                     }
-                    None => choice.probability = 0.0,
                 }
             }
-            choice.said.sort_by_key(|&p| self.proposals[p].takes.first().map_or(0, |s| s.from));
-            choices.push(choice);
+            longer.sort_by(|a, b| b.0.total_cmp(&a.0).then_with(|| a.1.said.cmp(&b.1.said)));
+            longer.truncate(FOLLOWED);
+            open = longer;
         }
-        choices.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+        let mut choices: Vec<Choice> = choices.into_iter().map(|(_, c)| c).collect();
+        choices.sort_by(|a, b| b.probability.total_cmp(&a.probability).then_with(|| a.said.cmp(&b.said)));
         choices
     }
 
-    /// Proposals of a kind with their probabilities, likeliest first.
-    fn ranked(&self, text: &Text, kind: Kind, weight: &impl Fn(Feature) -> f64) -> Vec<(f64, usize)> {
-        let of_kind: Vec<usize> =
-            (0..self.proposals.len()).filter(|&p| self.proposals[p].kind == kind).collect();
-        let mut features = Vec::new();
-        let log_odds = of_kind.iter().map(|&p| {
-            text.features(&self.proposals[p], &mut features);
-            features.sort_unstable();
-            features.dedup();
-            features.iter().map(|&f| weight(f)).sum::<f64>()
-        });
-        let p = normalised(&log_odds.collect::<Vec<_>>());
-        let mut ranked: Vec<(f64, usize)> = p.into_iter().zip(of_kind).collect();
-        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        ranked
+    /// A reading that ends; those that say the same are one, as the likeliest has it.
+    fn close(&self, probability: f64, history: &History, choices: &mut Vec<(f64, Choice)>) {
+        let same = choices.iter_mut().find(|(_, c)| self.say_the_same(&c.said, &history.said));
+        match same {
+            Some((most, same)) => {
+                same.probability += probability;
+                if probability > *most {
+                    (*most, same.said) = (probability, history.said.clone());
+                }
+            }
+            None => choices.push((probability, Choice { probability, said: history.said.clone() })),
+        }
     }
 
-    /// Whether two proposals can't both be said: they need the same words.
-    pub fn clash(&self, a: usize, b: usize) -> bool {
-        let (a, b) = (&self.proposals[a], &self.proposals[b]);
-        a.takes.iter().any(|s| b.takes.iter().any(|t| s.overlaps(*t)))
+    /// What is said once one more is.
+    pub fn after(&self, history: &History, next: usize) -> History {
+        let p = &self.proposals[next];
+        let nouns = [p.noun, p.other].map(|n| n.map(|n| self.groups.nouns[n].span));
+        let rel = p.rel.map(|r| self.groups.rels[r].span);
+        let ends = nouns.iter().flatten().chain(&rel).chain(&p.takes).map(|s| s.to);
+        History {
+            said: history.said.iter().copied().chain([next]).collect(),
+            last: Some(p.kind),
+            end: ends.max().unwrap_or(0).max(history.end),
+            nouns,
+            rel,
+        }
+    }
+
+    /// Whether a proposal can't be said any more: its words were said, but for what lies at one place.
+    pub fn is_said(&self, history: &History, next: usize) -> bool {
+        let b = &self.proposals[next];
+        history.said.iter().map(|&a| &self.proposals[a]).any(|a| {
+            let apart = a.rel.is_some() && b.rel.is_some() && a.noun != b.noun;
+            let overlap = a.takes.iter().any(|s| b.takes.iter().any(|t| s.overlaps(*t)));
+            !apart && overlap || a.content == b.content
+        })
+    }
+
+    /// Whether readings differ by no more than how many words their names have: "the new gym", "the gym".
+    fn say_the_same(&self, a: &[usize], b: &[usize]) -> bool {
+        let head = |n: Option<usize>| n.map(|n| self.groups.nouns[n].head);
+        let same = |(a, b): (&usize, &usize)| {
+            let (a, b) = (&self.proposals[*a], &self.proposals[*b]);
+            let alike = a.kind == b.kind && a.rel == b.rel && a.beside_groups() == b.beside_groups();
+            a.content == b.content || alike && head(a.noun) == head(b.noun) && head(a.other) == head(b.other)
+        };
+        a.len() == b.len() && a.iter().zip(b).all(same)
     }
 }
 
-/// p(kinds | text), as [`Text::of_kinds`] has their features; what kinds have in common is summed once.
-fn likely_kinds(whole: &[Feature], all_kinds: &[Kinds], weight: &impl Fn(Feature) -> f64) -> Vec<f64> {
-    let of_kind = Kind::ALL.map(|kind| Text::of_kind(whole, kind).map(weight).sum::<f64>());
-    let most = all_kinds.iter().map(Vec::len).max().unwrap_or(0);
-    let of_count: Vec<f64> = (0..=most).map(|n| Text::of_count(whole, n).map(weight).sum()).collect();
-    let log_odds = all_kinds.iter().enumerate().map(|(nth, kinds)| {
-        let each: f64 = distinct(kinds).map(|kind| of_kind[kind as usize]).sum();
-        each + of_count[kinds.len()] + Text::of_shape(whole, nth).map(weight).sum::<f64>()
-    });
-    normalised(&log_odds.collect::<Vec<_>>())
+/// Proposals with their weights, as far as they were asked for.
+struct Weighed<'a> {
+    found: &'a Found,
+    text: &'a Text<'a>,
+    judge: &'a Judge,
+    of_kind: Vec<Option<Vec<(f32, usize)>>>,
+}
+
+impl Weighed<'_> {
+    /// p(kind of the next act), [`Kind::Nothing`] if there is none.
+    fn kinds(&self, history: &History) -> Vec<f64> {
+        let mut sums = [0.0; KINDS];
+        self.text.next_kind(history).into_iter().for_each(|f| self.judge.add(f, &mut sums));
+        normalised(&sums.map(f64::from))
+    }
+
+    /// Proposals of a kind with their probabilities, likeliest first.
+    fn options(&mut self, history: &History, kind: Kind) -> Vec<(f64, usize)> {
+        let (found, text, judge) = (self.found, self.text, self.judge);
+        let of_kind = self.of_kind[kind as usize].get_or_insert_with(|| {
+            let mut features = Vec::new();
+            let all = found.proposals.iter().enumerate().filter(|(_, p)| p.kind == kind);
+            all.map(|(i, p)| {
+                text.features(p, &mut features);
+                (features.iter().map(|&f| judge.weight(f)).sum(), i)
+            })
+            .collect()
+        });
+        let free: Vec<(f64, usize)> = of_kind
+            .iter()
+            .filter(|(_, p)| !found.is_said(history, *p))
+            .map(|&(w, p)| {
+                let next = text.next_groups(&found.proposals[p], history);
+                (f64::from(w + next.iter().map(|&f| judge.weight(f)).sum::<f32>()), p)
+            })
+            .collect();
+        let p = normalised(&free.iter().map(|(w, _)| *w).collect::<Vec<_>>());
+        let mut ranked: Vec<(f64, usize)> = p.into_iter().zip(free.into_iter().map(|(_, p)| p)).collect();
+        ranked.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        ranked
+    }
 }
 
 fn normalised(logs: &[f64]) -> Vec<f64> {

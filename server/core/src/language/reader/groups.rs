@@ -4,6 +4,7 @@ use crate::language::act::{Features, Head, Ordinal, Owner, Phrase};
 use crate::language::lexicon::names::Name;
 use crate::language::lexicon::numbers::counted;
 use crate::language::reader::lexicon::{Class, Implied, Pointer, lexicon};
+use crate::language::reader::made;
 use crate::language::reader::tokens::Token;
 use crate::language::relation::Relation;
 
@@ -51,6 +52,21 @@ pub struct Noun {
     pub has_verb: bool,
     /// A floor, by number.
     pub is_floor: bool,
+    /// How it was made of its words.
+    pub made: Made,
+}
+
+/// How a name was made of words.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Made {
+    /// As said.
+    Said,
+    /// Of words that sound like it.
+    Heard,
+    /// Of what was named before: "mine", "the big one".
+    Meant,
+    /// Of what is done there: "where we eat".
+    Told,
 }
 
 /// Words that relate.
@@ -76,7 +92,9 @@ pub struct Groups {
 }
 
 /// A name has no more words.
-const NAME_MAX: usize = 7;
+pub(super) const NAME_MAX: usize = 7;
+/// All parts of shorter runs of words may be names.
+const RUN_SHORT: usize = 5;
 
 /// Finds them.
 pub fn groups(tokens: &[Token]) -> Groups {
@@ -99,6 +117,7 @@ fn nouns(tokens: &[Token]) -> Vec<Noun> {
                 ends: true,
                 has_verb: false,
                 is_floor: false,
+                made: Made::Said,
             });
         }
         if !names(at) || at > 0 && names(at - 1) {
@@ -112,20 +131,30 @@ fn nouns(tokens: &[Token]) -> Vec<Noun> {
         of_run(tokens, Span { from: at, to: end }, &mut all);
         at = end;
     }
+    made::heard(tokens, &mut all);
+    made::meant(tokens, &mut all);
+    made::told(tokens, &mut all);
     all
 }
 
 /// Names within one run of words that may be in names, with what "of" and "'s" add.
 fn of_run(tokens: &[Token], run: Span, all: &mut Vec<Noun>) {
     let verb = |i: usize| tokens[i].class == Class::Verb;
+    let short = run.to - run.from <= RUN_SHORT;
     let mut starts: Vec<usize> = vec![run.from];
     starts.extend((run.from + 1..run.to).filter(|&i| {
         let before = tokens[i - 1].class;
-        matches!(before, Class::Verb | Class::Ord | Class::Num | Class::Quality | Class::Person | Class::Time)
+        short
+            || lexicon().is_head(&tokens[i - 1].text)
+            || matches!(
+                before,
+                Class::Verb | Class::Ord | Class::Num | Class::Quality | Class::Person | Class::Time
+            )
     }));
     let mut ends: Vec<usize> = vec![run.to];
     ends.extend((run.from + 1..run.to).filter(|&i| {
         verb(i)
+            || short
             || lexicon().is_head(&tokens[i - 1].text)
             || matches!(tokens[i].class, Class::Num | Class::Ord | Class::Quality)
     }));
@@ -173,7 +202,8 @@ fn push(tokens: &[Token], run: Span, span: Span, head: usize, all: &mut Vec<Noun
     while core > span.from && (tokens[core].class == Class::Num || tokens[core].text.len() == 1) {
         core -= 1;
     }
-    let is_floor = matches!(tokens[core].text.as_str(), "floor" | "level" | "storey" | "floors" | "levels");
+    let is_floor =
+        matches!(tokens[core].text.as_str(), "floor" | "level" | "storey" | "floors" | "levels" | "deck");
     all.push(Noun {
         span,
         head,
@@ -184,6 +214,7 @@ fn push(tokens: &[Token], run: Span, span: Span, head: usize, all: &mut Vec<Noun
         ends: span.to == run.to,
         has_verb: words.iter().any(|t| t.class == Class::Verb),
         is_floor,
+        made: Made::Said,
     });
 }
 
@@ -246,7 +277,8 @@ fn phrase(tokens: &[Token], span: Span, head: usize) -> Option<Phrase> {
     Some(Phrase { head: Head::Named(name), features, within: Vec::new() })
 }
 
-fn ordinal(word: &str) -> Option<Ordinal> {
+/// A place in a row.
+pub fn ordinal(word: &str) -> Option<Ordinal> {
     const NTH: [&str; 12] = [
         "first", "second", "third", "fourth", "fifth", "sixth", "seventh", "eighth", "ninth", "tenth",
         "eleventh", "twelfth",
@@ -255,7 +287,8 @@ fn ordinal(word: &str) -> Option<Ordinal> {
         "last" | "final" => Some(Ordinal::Last),
         "next" => Some(Ordinal::Next),
         _ => {
-            let digits = word.trim_end_matches(char::is_alphabetic);
+            let digits =
+                ["st", "nd", "rd", "th"].iter().find_map(|end| word.strip_suffix(end)).unwrap_or(word);
             let nth = NTH.iter().position(|n| *n == word).map(|n| n as u32 + 1);
             nth.or_else(|| if digits.len() < word.len() { digits.parse().ok() } else { None })
                 .map(Ordinal::Nth)
@@ -269,23 +302,24 @@ fn rels(tokens: &[Token]) -> Vec<Rel> {
         let fits = |words: &[String]| {
             words.iter().enumerate().all(|(k, w)| tokens.get(at + k).is_some_and(|t| t.text == *w))
         };
-        let mut longest = true;
+        let mut longest_span = 0;
         for said in lexicon().relations(&tokens[at].text) {
             if !fits(&said.words) {
                 continue;
             }
             let span = Span { from: at, to: at + said.words.len() };
             let within = all.iter().any(|r| r.span.from < at && r.span.to >= span.to && r.longest);
-            if all.iter().any(|r| r.span == span && r.implied.is_some() == said.implied.is_some()) {
+            if all.iter().any(|r| r.span == span && r.relation == said.relation && r.implied == said.implied)
+            {
                 continue;
             }
             all.push(Rel {
                 span,
                 relation: said.relation,
                 implied: said.implied,
-                longest: longest && !within,
+                longest: span.to >= longest_span && !within,
             });
-            longest = false;
+            longest_span = longest_span.max(span.to);
         }
     }
     all

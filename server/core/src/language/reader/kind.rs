@@ -3,6 +3,8 @@
 /// Kinds of acts, each with weights of its own.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Kind {
+    /// "Well then."
+    Nothing,
     /// "This is the gym."
     Label,
     /// "That was the gym."
@@ -55,9 +57,13 @@ pub enum Kind {
     WayTo,
 }
 
+/// How many there are.
+pub const KINDS: usize = 26;
+
 impl Kind {
-    /// All of them.
-    pub const ALL: [Self; 25] = [
+    /// All of them, nothing first.
+    pub const ALL: [Self; KINDS] = [
+        Self::Nothing,
         Self::Label,
         Self::Before,
         Self::NotLabel,

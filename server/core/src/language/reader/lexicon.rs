@@ -1,6 +1,8 @@
 //! Words as data: what `server/core/lexicon` says of them.
 
 use crate::language::act::Head;
+use crate::language::reader::forms::{expanded, inflected};
+use crate::language::reader::sound::sound;
 use crate::language::relation::Relation;
 use std::collections::{BTreeMap, HashMap, HashSet};
 use std::sync::LazyLock;
@@ -8,7 +10,9 @@ use std::sync::LazyLock;
 const CLASSES: &str = include_str!("../../../lexicon/english/classes.txt");
 const RELATIONS: &str = include_str!("../../../lexicon/english/relations.txt");
 const HEADS: &str = include_str!("../../../lexicon/english/heads.txt");
+const PLACES: &str = include_str!("../../../lexicon/english/places.txt");
 const MISHEARD: &str = include_str!("../../../lexicon/english/misheard.txt");
+const SENSES: &str = include_str!("../../../lexicon/english/senses.txt");
 const CONTRACTIONS: &str = include_str!("../../../lexicon/english/contractions.txt");
 
 /// What a word is, whatever stands beside it.
@@ -175,6 +179,10 @@ pub struct Lexicon {
     /// By their first word, longest first.
     relations: BTreeMap<String, Vec<Said>>,
     heads: HashSet<&'static str>,
+    senses: HashMap<String, &'static str>,
+    /// Words that stand in names of places, and by how they sound.
+    of_places: HashSet<&'static str>,
+    sounds: HashMap<String, &'static str>,
     contractions: HashMap<&'static str, &'static str>,
     /// By the first word of what is heard, longest first: what is heard, and what was said.
     misheard: BTreeMap<&'static str, Vec<Misheard>>,
@@ -254,6 +262,16 @@ impl Lexicon {
             said.sort_by_key(|s| std::cmp::Reverse(s.words.len()));
         }
         let heads = HEADS.lines().filter(|l| !l.starts_with('#')).flat_map(|l| l.split(' ')).collect();
+        let heads: HashSet<&str> = heads;
+        let named = PLACES.lines().filter(|l| !l.starts_with('#')).flat_map(|l| l.split([' ', ';']));
+        let of_places: HashSet<&str> = heads.iter().copied().chain(named).filter(|w| w.len() > 2).collect();
+        let mut of_sounds: Vec<&str> = of_places.iter().copied().collect();
+        // The longest of those that sound alike, then the first.
+        of_sounds.sort_by_key(|w| (std::cmp::Reverse(w.len()), *w));
+        let mut sounds: HashMap<String, &str> = HashMap::new();
+        for word in of_sounds {
+            sounds.entry(sound(word)).or_insert(word);
+        }
         let mut misheard: BTreeMap<&str, Vec<Misheard>> = BTreeMap::new();
         for (heard, said) in entries(MISHEARD, '=') {
             let [heard, said] = [heard, said].map(|words| words.split(' ').collect::<Vec<_>>());
@@ -262,7 +280,27 @@ impl Lexicon {
         for all in misheard.values_mut() {
             all.sort_by_key(|(heard, _)| std::cmp::Reverse(heard.len()));
         }
-        Self { classes, relations, heads, contractions: entries(CONTRACTIONS, '=').collect(), misheard }
+        let mut senses = HashMap::new();
+        for (sense, words) in entries(SENSES, ':') {
+            // Verbs' senses are named by a stroke at the end.
+            let is_stem = sense.ends_with('-');
+            for word in words.split(' ').filter(|w| !w.is_empty()) {
+                let all = if is_stem { inflected(word) } else { vec![word.to_owned(), format!("{word}s")] };
+                for form in all {
+                    senses.entry(form).or_insert(sense);
+                }
+            }
+        }
+        Self {
+            classes,
+            relations,
+            heads,
+            senses,
+            of_places,
+            sounds,
+            contractions: entries(CONTRACTIONS, '=').collect(),
+            misheard,
+        }
     }
 
     /// What a word is.
@@ -280,6 +318,21 @@ impl Lexicon {
     /// Whether a noun names places by itself.
     pub fn is_head(&self, word: &str) -> bool {
         self.heads.contains(word) || crate::language::lexicon::is_place(word)
+    }
+
+    /// What words of its sense are called.
+    pub fn sense(&self, word: &str) -> Option<&'static str> {
+        self.senses.get(word).copied()
+    }
+
+    /// Whether a word stands in names of places.
+    pub fn is_of_places(&self, word: &str) -> bool {
+        self.of_places.contains(word) || self.is_head(word)
+    }
+
+    /// A word of names of places that sounds so.
+    pub fn sounding(&self, sound: &str) -> Option<&'static str> {
+        self.sounds.get(sound).copied()
     }
 
     /// What a word is short for.
@@ -306,55 +359,4 @@ impl Lexicon {
     pub fn relations(&self, first: &str) -> &[Said] {
         self.relations.get(first).map_or(&[], Vec::as_slice)
     }
-}
-
-/// The forms of a verb: a stem ending in a single consonant after a single vowel doubles it.
-fn inflected(stem: &str) -> Vec<String> {
-    let bytes = stem.as_bytes();
-    let is_vowel = |b: u8| matches!(b, b'a' | b'e' | b'i' | b'o' | b'u');
-    let mut forms = vec![stem.to_owned()];
-    let (last, before) = (bytes[bytes.len() - 1], bytes[bytes.len().saturating_sub(2)]);
-    let root = match last {
-        b'e' => stem[..stem.len() - 1].to_owned(),
-        b'y' if !is_vowel(before) => format!("{}i", &stem[..stem.len() - 1]),
-        _ => stem.to_owned(),
-    };
-    let ends_hissing = ["s", "x", "ch", "sh", "o"].iter().any(|e| stem.ends_with(e));
-    forms.push(if ends_hissing || root.ends_with('i') { format!("{root}es") } else { format!("{stem}s") });
-    let doubled = bytes.len() > 2
-        && !is_vowel(last)
-        && !matches!(last, b'w' | b'x' | b'y')
-        && is_vowel(before)
-        && !is_vowel(bytes[bytes.len() - 3]);
-    let long = if doubled { format!("{stem}{}", last as char) } else { root.clone() };
-    forms.push(format!("{long}ed"));
-    forms.push(format!("{}ing", if last == b'y' { stem } else { &long }));
-    if doubled {
-        forms.push(format!("{stem}ed"));
-        forms.push(format!("{stem}ing"));
-    }
-    forms
-}
-
-/// "a|b (c) d" as all that it stands for.
-fn expanded(pattern: &str) -> Vec<Vec<String>> {
-    let mut all: Vec<Vec<String>> = vec![vec![]];
-    let spaced = pattern.replace("(a)round", "around|round");
-    for part in spaced.split(' ') {
-        let optional = part.starts_with('(');
-        let choices: Vec<&str> = part.trim_matches(['(', ')']).split('|').collect();
-        let mut next = Vec::new();
-        for words in &all {
-            if optional {
-                next.push(words.clone());
-            }
-            for choice in &choices {
-                let mut more = words.clone();
-                more.push((*choice).to_owned());
-                next.push(more);
-            }
-        }
-        all = next;
-    }
-    all
 }

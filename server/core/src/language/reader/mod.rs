@@ -12,12 +12,17 @@
 mod chunks;
 pub mod decide;
 pub mod features;
+mod forms;
 pub mod groups;
 pub mod judge;
 pub mod kind;
 pub mod lexicon;
+mod made;
+mod of_groups;
+pub mod of_kinds;
 pub mod propose;
 pub mod read;
+mod sound;
 #[cfg(test)]
 mod tests;
 pub mod tokens;

@@ -1,12 +1,12 @@
 //! Everything that a text's groups may say: acts, for the judge to weigh.
 
 use crate::language::act::{
-    About, Content, Head, Locate, Modifiers, Ordinal, Phrase, Quantity, Question, Sameness,
+    About, Content, Head, Locate, Modifiers, Ordinal, Owner, Phrase, Quantity, Question, Sameness,
 };
 use crate::language::lexicon::names::Name;
 use crate::language::lexicon::numbers::counted;
 use crate::language::notation::phrase_notation;
-use crate::language::reader::groups::{Groups, Noun, Rel, Span};
+use crate::language::reader::groups::{Groups, Made, Noun, Rel, Span, ordinal};
 use crate::language::reader::kind::Kind;
 use crate::language::reader::lexicon::{Class, Implied, Pointer};
 use crate::language::reader::tokens::Token;
@@ -29,15 +29,39 @@ pub struct Proposal {
     pub takes: Vec<Span>,
 }
 
+impl Proposal {
+    /// What it says beside its groups: how often it holds of kinds, and what it points at.
+    pub fn beside_groups(&self) -> (Option<Quantity>, Option<&Head>) {
+        fn at(phrase: &Phrase) -> Option<&Head> {
+            Some(&phrase.head).filter(|head| !matches!(head, Head::Named(_)))
+        }
+        fn of(content: &Content) -> (Option<Quantity>, Option<&Head>) {
+            match content {
+                Content::Generic { quantity, .. } => (Some(*quantity), None),
+                Content::Locate(locate) => (None, locate.landmarks.first().and_then(at)),
+                Content::Label { at: place, .. } => (None, at(place)),
+                Content::Ask { about: About::Phrase(phrase), .. } => (None, at(phrase)),
+                Content::Ask { about: About::Content(content), .. }
+                | Content::Negate(content)
+                | Content::Correct { is: content, .. }
+                | Content::Route { then: Some(content), .. } => of(content),
+                _ => (None, None),
+            }
+        }
+        of(&self.content)
+    }
+}
+
 /// A figure is at most so many words from its relation.
 const FAR: usize = 14;
 
 /// All of them.
 pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
     let mut all = Vec::new();
+    let way = steps(tokens, groups);
     let named = |n: &Noun| n.pointer.is_none();
     for (i, noun) in groups.nouns.iter().enumerate().filter(|(_, n)| named(n)) {
-        of_name(tokens, i, noun, &mut all);
+        of_name(tokens, i, noun, &way, &mut all);
     }
     for (i, a) in groups.nouns.iter().enumerate() {
         for (k, b) in groups.nouns.iter().enumerate().filter(|(_, b)| named(b)) {
@@ -57,7 +81,6 @@ pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
             });
         }
     }
-    let way = steps(tokens, groups);
     for (r, rel) in groups.rels.iter().enumerate() {
         for spot in spots(tokens, groups, r, rel) {
             located(groups, &spot, &way, &mut all);
@@ -69,6 +92,17 @@ pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
         }
     }
     let whole = vec![Span { from: 0, to: tokens.len() }];
+    for (n, noun) in groups.nouns.iter().enumerate().filter(|(_, n)| is_told_by(tokens, n)) {
+        let spot = Spot {
+            relation: Relation::At,
+            rel: None,
+            noun: Some(n),
+            landmarks: vec![noun.phrase.clone()],
+            takes: noun.span,
+        };
+        located(groups, &spot, &way, &mut all);
+    }
+    owned(tokens, groups, &mut all);
     let bare =
         |kind, content| Proposal { kind, content, noun: None, other: None, rel: None, takes: whole.clone() };
     let start = Content::Same { what: Phrase::new(Head::Here), like: Phrase::new(Head::Start), same: true };
@@ -79,11 +113,24 @@ pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
     let ask = |kind, head| Content::Ask { kind, about: About::Phrase(Phrase::new(head)) };
     all.push(bare(Kind::What, ask(Question::What, Head::Unknown)));
     all.push(bare(Kind::WhatHere, ask(Question::What, Head::Here)));
+    all.push(bare(Kind::What, ask(Question::What, Head::Previous)));
+    all.push(bare(Kind::Route, ask(Question::Route, Head::Start)));
     all.push(bare(Kind::Way, Content::Route { steps: way, then: None }));
     all
 }
 
-fn of_name(tokens: &[Token], i: usize, noun: &Noun, all: &mut Vec<Proposal>) {
+fn at(noun: &Noun, relation: Relation, pointer: Head) -> Locate {
+    Locate {
+        figure: noun.phrase.clone(),
+        relation,
+        modifiers: Modifiers::default(),
+        landmarks: vec![Phrase::new(pointer)],
+        frame: None,
+        repaired: false,
+    }
+}
+
+fn of_name(tokens: &[Token], i: usize, noun: &Noun, way: &[String], all: &mut Vec<Proposal>) {
     let here = || Phrase::new(Head::Here);
     let label = |at: Phrase| Content::Label { at, what: noun.phrase.clone(), sameness: Sameness::Open };
     let same = |same| Content::Same { what: here(), like: noun.phrase.clone(), same };
@@ -101,6 +148,21 @@ fn of_name(tokens: &[Token], i: usize, noun: &Noun, all: &mut Vec<Proposal>) {
     add(Kind::Other, same(false));
     add(Kind::NotSame, Content::Negate(Box::new(same(true))));
     add(Kind::Attribute, Content::Attribute { what: noun.phrase.clone(), value: value(tokens, noun.span) });
+    for pointer in [Head::Here, Head::There] {
+        let content = Content::Locate(at(noun, Relation::At, pointer));
+        add(Kind::MendLocate, mend(content.clone()));
+        add(Kind::NotLocate, Content::Negate(Box::new(content.clone())));
+        add(
+            Kind::IsLocated,
+            Content::Ask { kind: Question::Whether, about: About::Content(Box::new(content.clone())) },
+        );
+        add(Kind::Locate, content);
+    }
+    let end = Content::Locate(at(noun, Relation::AtEndOf, Head::Path));
+    add(Kind::WayTo, Content::Route { steps: way.to_vec(), then: Some(Box::new(end)) });
+    add(Kind::What, ask(Question::What));
+    let about = |content| Content::Ask { kind: Question::Whether, about: About::Content(Box::new(content)) };
+    add(Kind::IsLabel, about(label(Phrase::new(Head::There))));
     add(Kind::Where, ask(Question::Where));
     add(Kind::Route, ask(Question::Route));
     add(Kind::HowFar, ask(Question::HowFar));
@@ -108,6 +170,47 @@ fn of_name(tokens: &[Token], i: usize, noun: &Noun, all: &mut Vec<Proposal>) {
         Kind::IsLabel,
         Content::Ask { kind: Question::Whether, about: About::Content(Box::new(label(here()))) },
     );
+}
+
+/// "The third door": a place by where it is in a row, or "that door there", without a word that relates.
+fn is_told_by(tokens: &[Token], noun: &Noun) -> bool {
+    let f = &noun.phrase.features;
+    let counted = tokens[noun.span.from].class == Class::Num && noun.span.to - noun.span.from > 1;
+    noun.pointer.is_none()
+        && noun.ends
+        && (f.ordinal.is_some() || f.this || counted)
+        && !noun.is_floor
+        && noun.is_place
+}
+
+/// "The corner office is Priya's", "the third hut belongs to the pilots", "that room is mine".
+fn owned(tokens: &[Token], groups: &Groups, all: &mut Vec<Proposal>) {
+    for (i, a) in groups.nouns.iter().enumerate().filter(|(_, n)| n.pointer.is_none() && n.made == Made::Said)
+    {
+        for (k, w) in groups.nouns.iter().enumerate().filter(|(_, w)| w.span.from >= a.span.to) {
+            let next = |k: usize| tokens.get(w.span.to + k);
+            let before = w.span.from.checked_sub(1).map(|b| tokens[b].text.as_str());
+            let owns = next(0).is_some_and(|t| t.class == Class::Owner)
+                && next(1).is_none_or(|t| !t.class.names())
+                || before.is_some_and(|b| matches!(b, "to" | "for" | "the"))
+                    && tokens[a.span.to..w.span.from].iter().any(|t| t.text.starts_with("belong"));
+            if w.pointer.is_some() || !owns || w.made != Made::Said || w.span.from - a.span.to > FAR {
+                continue;
+            }
+            let mut also = a.phrase.clone();
+            also.features.owner = w.phrase.full_name().map(|n| Owner::Named(n.as_str().to_owned()));
+            let content = Content::Alias { what: a.phrase.clone(), also };
+            let (noun, other) = (Some(i), Some(k));
+            all.push(Proposal {
+                kind: Kind::Alias,
+                content,
+                noun,
+                other,
+                rel: None,
+                takes: vec![a.span, w.span],
+            });
+        }
+    }
 }
 
 /// Where something may lie.
@@ -164,8 +267,16 @@ fn spots(tokens: &[Token], groups: &Groups, r: usize, rel: &Rel) -> Vec<Spot> {
     if tokens.get(after).is_some_and(|t| t.text == "where") {
         all.push(spot(None, vec![purpose(&tokens[after..])], after + 1, rel.relation));
     }
-    // "On three".
-    let storey = tokens.get(after).filter(|_| rel.relation == Relation::On).and_then(|t| counted(&t.text));
+    // "On three", "on the fifth".
+    let ends = |at: usize| tokens.get(at).is_none_or(|t| !t.class.names());
+    let number = |t: &Token| {
+        counted(&t.text).or(match ordinal(&t.text) {
+            Some(Ordinal::Nth(n)) => Some(n),
+            _ => None,
+        })
+    };
+    let storey =
+        tokens.get(after).filter(|_| rel.relation == Relation::On && ends(after + 1)).and_then(number);
     all.extend(storey.and_then(floor).map(|f| spot(None, vec![f], after + 1, Relation::OnLevel)));
     all
 }

@@ -11,6 +11,8 @@ pub struct Token {
     pub capital: bool,
     /// What it is.
     pub class: Class,
+    /// What words of its sense are called, if the lexicon tells.
+    pub sense: Option<&'static str>,
 }
 
 /// Longer texts are not read: half of one may say the opposite of the whole.
@@ -95,8 +97,8 @@ fn plain(c: char) -> char {
 /// One word as the tokens that it is short for.
 fn apart(word: &str, capital: bool, out: &mut Vec<Token>) {
     let mut push = |text: &str, capital: bool| {
-        let class = lexicon().class(text);
-        out.push(Token { text: text.to_owned(), capital, class });
+        let (class, sense) = (lexicon().class(text), lexicon().sense(text));
+        out.push(Token { text: text.to_owned(), capital, class, sense });
     };
     if let Some(full) = lexicon().contraction(word) {
         full.split(' ').for_each(|w| push(w, false));
