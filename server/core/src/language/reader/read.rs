@@ -14,8 +14,36 @@ const DOUBTED: f64 = 0.7;
 const DOUBTS: &[&str] =
     &["think", "believe", "maybe", "perhaps", "probably", "guess", "might", "suppose", "reckon"];
 
-/// All that it may say, with probabilities; one without acts says nothing of places.
+/// Sentences of one text that are read one by one.
+const SENTENCES: usize = 8;
+
+/// All that it may say, with probabilities; one without acts says nothing of places. Several sentences say what each
+/// says, unless together they say something likelier.
 pub fn analyses(text: &str, judge: &Judge) -> Vec<Analysis> {
+    let mut all = of_whole(text, judge);
+    let sentences: Vec<&str> =
+        text.split_inclusive(['.', '?', '!']).filter(|s| s.chars().any(char::is_alphanumeric)).collect();
+    if (2..=SENTENCES).contains(&sentences.len()) {
+        let each: Vec<Analysis> =
+            sentences.iter().filter_map(|s| of_whole(s, judge).into_iter().next()).collect();
+        let weight = each.iter().map(|a| a.weight).product();
+        let mends = |a: &Analysis| {
+            a.acts.iter().any(|act| matches!(act.content, Content::Correct { .. } | Content::Negate(_)))
+        };
+        if !each.iter().any(mends) && all.first().is_none_or(|a| a.weight < weight) {
+            let joined = analysis(weight, each.into_iter().flat_map(|a| a.acts).collect());
+            all.retain(|a| a.notation != joined.notation);
+            for other in &mut all {
+                other.weight *= 1.0 - weight;
+            }
+            all.insert(0, joined);
+            all.truncate(KEPT);
+        }
+    }
+    all
+}
+
+fn of_whole(text: &str, judge: &Judge) -> Vec<Analysis> {
     let found = Found::new(text);
     if found.tokens.len() > MAX_TOKENS {
         return Vec::new();
