@@ -31,9 +31,7 @@ struct Sentence {
     weight: f32,
     gold: Vec<Vec<Act>>,
     first: String,
-    found: Found,
-    acts: Vec<Act>,
-    /// Readings to learn.
+    /// Readings to learn, by proposals of [`Found::new`]: those themselves would fill a machine's memory.
     readings: Vec<Vec<GoldAct>>,
 }
 
@@ -93,9 +91,7 @@ fn ours() -> Vec<Sentence> {
 fn sentence(text: &str, kind: &str, raw: Vec<String>) -> Sentence {
     let gold: Vec<Vec<Act>> = raw.iter().map(|r| acts(r)).collect();
     let found = Found::new(text);
-    let written: Vec<String> =
-        found.proposals.iter().map(|p| toponym_core::language::written(&p.content)).collect();
-    let all: Vec<Act> = written.iter().map(|w| acts(w).into_iter().next().unwrap_or(Act::Any)).collect();
+    let (written, all) = proposed(&found);
     // All readings that can be said whole; if none can, those whose kinds are known.
     let all_readings: Vec<Option<Vec<GoldAct>>> =
         gold.iter().zip(&raw).map(|(g, raw)| reading(g, raw, &found, &all, &written)).collect();
@@ -114,7 +110,15 @@ fn sentence(text: &str, kind: &str, raw: Vec<String>) -> Sentence {
     }
     let first = raw.into_iter().next().unwrap_or_default();
     let (text, kind) = (text.to_owned(), kind.to_owned());
-    Sentence { text, kind, weight: 1.0, gold, first, found, acts: all, readings }
+    Sentence { text, kind, weight: 1.0, gold, first, readings }
+}
+
+/// All that is proposed, as written and as it is compared.
+fn proposed(found: &Found) -> (Vec<String>, Vec<Act>) {
+    let written: Vec<String> =
+        found.proposals.iter().map(|p| toponym_core::language::written(&p.content)).collect();
+    let all = written.iter().map(|w| acts(w).into_iter().next().unwrap_or(Act::Any)).collect();
+    (written, all)
 }
 
 /// A reading as proposals; none if nothing proposes acts of some kind.

@@ -2,9 +2,10 @@
 
 use crate::lenient::{Act, acts, equal, same};
 use crate::train::train;
-use crate::{Sentence, kind};
+use crate::{Sentence, kind, proposed};
 use std::collections::BTreeMap;
 use toponym_core::language::parse_by;
+use toponym_core::language::reader::decide::Found;
 use toponym_core::language::reader::judge::Judge;
 use toponym_core::language::reader::kind::Kind;
 
@@ -84,9 +85,11 @@ fn score(
     bins: &mut Vec<(f64, bool)>,
 ) {
     for s in all {
-        let choices = s.found.choices(judge);
+        let found = Found::new(&s.text);
+        let (written, proposed) = proposed(&found);
+        let choices = found.choices(judge);
         let best = choices.first().cloned().unwrap_or_default();
-        let got: Vec<Act> = best.said.iter().map(|k| s.acts[*k].clone()).collect();
+        let got: Vec<Act> = best.said.iter().map(|k| proposed[*k].clone()).collect();
         let silent = s.gold.iter().any(Vec::is_empty);
         let right = s.gold.iter().any(|g| same(g, &got)) || silent && got.is_empty();
         let part = |g: &Vec<Act>| got.len() < g.len() && got.iter().all(|a| g.iter().any(|e| equal(e, a)));
@@ -103,7 +106,7 @@ fn score(
             kinds.sort_unstable();
             kinds
         };
-        let got_kinds = sorted(best.said.iter().map(|&k| s.found.proposals[k].kind).collect());
+        let got_kinds = sorted(best.said.iter().map(|&k| found.proposals[k].kind).collect());
         let of = |g: &Vec<Act>| g.iter().map(kind).collect::<Option<Vec<Kind>>>().map(sorted);
         let kinds_right = s.gold.iter().any(|g| of(g).as_ref() == Some(&got_kinds));
         if !right && kinds_right {
@@ -111,7 +114,7 @@ fn score(
         } else if !right {
             by.entry("kinds".to_owned()).or_default()[what] += 1;
         }
-        let could = silent || s.gold.iter().any(|g| g.iter().all(|e| s.acts.iter().any(|a| equal(a, e))));
+        let could = silent || s.gold.iter().any(|g| g.iter().all(|e| proposed.iter().any(|a| equal(a, e))));
         // As the grammar and the reader are heard together.
         let parse = parse_by(&s.text, judge);
         let said = acts(parse.notation());
@@ -128,8 +131,7 @@ fn score(
             c[3] += usize::from(could);
         }
         if show && what > 0 {
-            let written = |k: &usize| toponym_core::language::written(&s.found.proposals[*k].content);
-            let got: Vec<String> = best.said.iter().map(written).collect();
+            let got: Vec<&str> = best.said.iter().map(|k| written[*k].as_str()).collect();
             let cannot = if could { "" } else { "CAN'T " };
             println!(
                 "{} {cannot}{}{:?}\n     want {}\n     got  {} {:.2}",

@@ -2,6 +2,7 @@
 
 use crate::Sentence;
 use std::collections::HashMap;
+use toponym_core::language::reader::decide::Found;
 use toponym_core::language::reader::features::{Feature, Text};
 use toponym_core::language::reader::judge::{Row, Weights};
 use toponym_core::language::reader::kind::{KINDS, Kind};
@@ -11,7 +12,7 @@ use toponym_core::language::reader::of_kinds::History;
 const RATE: f32 = 0.05;
 const DECAY: f32 = 1e-2;
 const ROUNDS: usize = 10;
-/// Features of fewer choices are left out: they tell of one sentence only.
+/// Features that fewer outcomes have are left out, for size: of six or ten as much is read.
 const SEEN: u32 = 8;
 /// Smaller slopes change nothing.
 const LEAST: f32 = 1e-3;
@@ -84,7 +85,8 @@ fn choices(
     kinds: &mut Vec<KindChoice>,
     groups: &mut Vec<GroupChoice>,
 ) {
-    let text = Text::new(&s.found.tokens, &s.found.groups);
+    let found = Found::new(&s.text);
+    let text = Text::new(&found.tokens, &found.groups);
     let mut history = History::default();
     let Some(reading) = s.readings.first() else { return };
     let mut features = Vec::new();
@@ -98,10 +100,10 @@ fn choices(
         kinds.push(KindChoice { weight: s.weight, features: of_kinds.all(&text.next_kind(&history)), right });
         let Some(act) = reading.get(n) else { break };
         // What can't be proposed tells of its kind alone, and nothing of what comes after it.
-        let Some(&said) = act.right.iter().find(|p| !s.found.is_said(&history, **p)) else { break };
+        let Some(&said) = act.right.iter().find(|p| !found.is_said(&history, **p)) else { break };
         let mut outcomes = Vec::new();
-        for &p in act.proposals.iter().filter(|p| !s.found.is_said(&history, **p)) {
-            let proposal = &s.found.proposals[p];
+        for &p in act.proposals.iter().filter(|p| !found.is_said(&history, **p)) {
+            let proposal = &found.proposals[p];
             text.features(proposal, &mut features);
             features.extend(text.next_groups(proposal, &history));
             outcomes.push((of_groups.all(&features), act.right.contains(&p)));
@@ -109,7 +111,7 @@ fn choices(
         if outcomes.len() > 1 {
             groups.push(GroupChoice { weight: s.weight, outcomes });
         }
-        history = s.found.after(&history, said);
+        history = found.after(&history, said);
     }
 }
 

@@ -71,12 +71,20 @@ pub fn meant(tokens: &[Token], all: &mut Vec<Noun>) {
 /// "Where the interns sit": a place told by what is done there.
 pub fn told(tokens: &[Token], all: &mut Vec<Noun>) {
     for at in (1..tokens.len()).filter(|&i| tokens[i].text == "where") {
-        let mut place = Phrase::new(Head::Place);
-        let word = |t: &&Token| !matches!(t.class, Class::Stop | Class::Comma | Class::Question);
-        let words: Vec<&str> = tokens[at + 1..].iter().take_while(word).map(|t| t.text.as_str()).collect();
-        place.features.purpose = (!words.is_empty()).then(|| words.join(" "));
-        all.push(made(Span { from: at, to: at + 1 }, place, Made::Told));
+        all.push(made(Span { from: at, to: at + 1 }, purpose(&tokens[at..]), Made::Told));
     }
+}
+
+/// Some place, told by what is done there: the words behind "where", "to" or "for".
+pub fn purpose(tokens: &[Token]) -> Phrase {
+    let mut place = Phrase::new(Head::Place);
+    let tells = |t: &Token| matches!(t.text.as_str(), "where" | "for");
+    if let Some(at) = tokens.iter().position(tells) {
+        let is_word = |t: &&Token| !matches!(t.class, Class::Stop | Class::Comma | Class::Question);
+        let said: Vec<&str> = tokens[at + 1..].iter().take_while(is_word).map(|t| t.text.as_str()).collect();
+        place.features.purpose = (!said.is_empty()).then(|| said.join(" "));
+    }
+    place
 }
 
 fn made(span: Span, phrase: Phrase, made: Made) -> Noun {

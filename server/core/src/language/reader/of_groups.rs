@@ -99,13 +99,12 @@ impl Text<'_> {
             }
             out.push(new("often").num(*quantity as usize).done());
         }
-        // All of them for the kind itself, too.
-        let all = out.len();
-        for i in 0..all {
-            out.push(own(out[i], p.kind));
-        }
         out.sort_unstable();
         out.dedup();
+        // All of them for the kind itself, too.
+        for i in 0..out.len() {
+            out.push(own(out[i], p.kind));
+        }
     }
 
     /// Features of a proposal for being said after others, or first.

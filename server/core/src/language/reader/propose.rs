@@ -9,6 +9,7 @@ use crate::language::notation::phrase_notation;
 use crate::language::reader::groups::{Groups, Made, Noun, Rel, Span, ordinal};
 use crate::language::reader::kind::Kind;
 use crate::language::reader::lexicon::{Class, Implied, Pointer};
+use crate::language::reader::made::purpose;
 use crate::language::reader::tokens::Token;
 use crate::language::relation::Relation;
 
@@ -54,8 +55,10 @@ impl Proposal {
 
 /// A figure is at most so many words from its relation.
 const FAR: usize = 14;
+/// A text that may say more is not read, for its time: of two hundred sentences that people say one has more.
+pub const PROPOSALS_MAX: usize = 8000;
 
-/// All of them.
+/// All of them, or some more than [`PROPOSALS_MAX`].
 pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
     let mut all = Vec::new();
     let way = steps(tokens, groups);
@@ -64,6 +67,9 @@ pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
         of_name(tokens, i, noun, &way, &mut all);
     }
     for (i, a) in groups.nouns.iter().enumerate() {
+        if all.len() > PROPOSALS_MAX {
+            return all;
+        }
         for (k, b) in groups.nouns.iter().enumerate().filter(|(_, b)| named(b)) {
             if i == k || a.pointer.is_some_and(|p| p != Pointer::It) {
                 continue;
@@ -83,26 +89,27 @@ pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
     }
     for (r, rel) in groups.rels.iter().enumerate() {
         for spot in spots(tokens, groups, r, rel) {
+            if all.len() > PROPOSALS_MAX {
+                return all;
+            }
             located(groups, &spot, &way, &mut all);
         }
     }
     for (n, noun) in groups.nouns.iter().enumerate() {
-        if let Some(spot) = on_floor(tokens, n, noun) {
-            located(groups, &spot, &way, &mut all);
-        }
-    }
-    let whole = vec![Span { from: 0, to: tokens.len() }];
-    for (n, noun) in groups.nouns.iter().enumerate().filter(|(_, n)| is_told_by(tokens, n)) {
-        let spot = Spot {
-            relation: Relation::At,
-            rel: None,
-            noun: Some(n),
-            landmarks: vec![noun.phrase.clone()],
-            takes: noun.span,
+        let relation = match () {
+            () if is_floor(tokens, noun) => Relation::OnLevel,
+            () if is_told_by(tokens, noun) => Relation::At,
+            () => continue,
         };
+        if all.len() > PROPOSALS_MAX {
+            return all;
+        }
+        let landmarks = vec![noun.phrase.clone()];
+        let spot = Spot { relation, rel: None, noun: Some(n), landmarks, takes: noun.span };
         located(groups, &spot, &way, &mut all);
     }
     owned(tokens, groups, &mut all);
+    let whole = vec![Span { from: 0, to: tokens.len() }];
     let bare =
         |kind, content| Proposal { kind, content, noun: None, other: None, rel: None, takes: whole.clone() };
     let start = Content::Same { what: Phrase::new(Head::Here), like: Phrase::new(Head::Start), same: true };
@@ -119,15 +126,13 @@ pub fn propose(tokens: &[Token], groups: &Groups) -> Vec<Proposal> {
     all
 }
 
-fn at(noun: &Noun, relation: Relation, pointer: Head) -> Locate {
-    Locate {
-        figure: noun.phrase.clone(),
-        relation,
-        modifiers: Modifiers::default(),
-        landmarks: vec![Phrase::new(pointer)],
-        frame: None,
-        repaired: false,
-    }
+fn locate(figure: Phrase, relation: Relation, landmarks: Vec<Phrase>) -> Content {
+    let modifiers = Modifiers::default();
+    Content::Locate(Locate { figure, relation, modifiers, landmarks, frame: None, repaired: false })
+}
+
+fn whether(content: Content) -> Content {
+    Content::Ask { kind: Question::Whether, about: About::Content(Box::new(content)) }
 }
 
 fn of_name(tokens: &[Token], i: usize, noun: &Noun, way: &[String], all: &mut Vec<Proposal>) {
@@ -148,28 +153,22 @@ fn of_name(tokens: &[Token], i: usize, noun: &Noun, way: &[String], all: &mut Ve
     add(Kind::Other, same(false));
     add(Kind::NotSame, Content::Negate(Box::new(same(true))));
     add(Kind::Attribute, Content::Attribute { what: noun.phrase.clone(), value: value(tokens, noun.span) });
+    let at = |relation, pointer| locate(noun.phrase.clone(), relation, vec![Phrase::new(pointer)]);
     for pointer in [Head::Here, Head::There] {
-        let content = Content::Locate(at(noun, Relation::At, pointer));
+        let content = at(Relation::At, pointer);
         add(Kind::MendLocate, mend(content.clone()));
         add(Kind::NotLocate, Content::Negate(Box::new(content.clone())));
-        add(
-            Kind::IsLocated,
-            Content::Ask { kind: Question::Whether, about: About::Content(Box::new(content.clone())) },
-        );
+        add(Kind::IsLocated, whether(content.clone()));
         add(Kind::Locate, content);
     }
-    let end = Content::Locate(at(noun, Relation::AtEndOf, Head::Path));
-    add(Kind::WayTo, Content::Route { steps: way.to_vec(), then: Some(Box::new(end)) });
+    let end = Box::new(at(Relation::AtEndOf, Head::Path));
+    add(Kind::WayTo, Content::Route { steps: way.to_vec(), then: Some(end) });
     add(Kind::What, ask(Question::What));
-    let about = |content| Content::Ask { kind: Question::Whether, about: About::Content(Box::new(content)) };
-    add(Kind::IsLabel, about(label(Phrase::new(Head::There))));
+    add(Kind::IsLabel, whether(label(Phrase::new(Head::There))));
     add(Kind::Where, ask(Question::Where));
     add(Kind::Route, ask(Question::Route));
     add(Kind::HowFar, ask(Question::HowFar));
-    add(
-        Kind::IsLabel,
-        Content::Ask { kind: Question::Whether, about: About::Content(Box::new(label(here()))) },
-    );
+    add(Kind::IsLabel, whether(label(here())));
 }
 
 /// "The third door": a place by where it is in a row, or "that door there", without a word that relates.
@@ -263,10 +262,6 @@ fn spots(tokens: &[Token], groups: &Groups, r: usize, rel: &Rel) -> Vec<Spot> {
         };
         all.push(spot(Some(k), vec![n.phrase.clone()], n.span.to, relation));
     }
-    // "Next to where they sell the tickets".
-    if tokens.get(after).is_some_and(|t| t.text == "where") {
-        all.push(spot(None, vec![purpose(&tokens[after..])], after + 1, rel.relation));
-    }
     // "On three", "on the fifth".
     let ends = |at: usize| tokens.get(at).is_none_or(|t| !t.class.names());
     let number = |t: &Token| {
@@ -281,18 +276,12 @@ fn spots(tokens: &[Token], groups: &Groups, r: usize, rel: &Rel) -> Vec<Spot> {
     all
 }
 
-/// "Customer service, second floor".
-fn on_floor(tokens: &[Token], n: usize, noun: &Noun) -> Option<Spot> {
+/// "Customer service, second floor": a floor that no word relates.
+fn is_floor(tokens: &[Token], noun: &Noun) -> bool {
     let before = |k: usize| noun.span.from.checked_sub(k).map(|b| &tokens[b]);
     let told = |t: Option<&Token>| t.is_some_and(|t| t.class == Class::Prep);
     let in_relation = told(before(1)) || before(1).is_some_and(|t| t.class == Class::Det) && told(before(2));
-    (noun.is_floor && !in_relation && noun.phrase.features.ordinal.is_some()).then(|| Spot {
-        relation: Relation::OnLevel,
-        rel: None,
-        noun: Some(n),
-        landmarks: vec![noun.phrase.clone()],
-        takes: noun.span,
-    })
+    noun.is_floor && !in_relation && noun.phrase.features.ordinal.is_some()
 }
 
 fn floor(n: u32) -> Option<Phrase> {
@@ -312,14 +301,7 @@ fn located(groups: &Groups, spot: &Spot, way: &[String], all: &mut Vec<Proposal>
             Some(Pointer::Agent | Pointer::Speaker) => Phrase::new(Head::Here),
             _ => figure.phrase.clone(),
         };
-        let content = Content::Locate(Locate {
-            figure: head.clone(),
-            relation: spot.relation,
-            modifiers: Modifiers::default(),
-            landmarks: spot.landmarks.clone(),
-            frame: None,
-            repaired: false,
-        });
+        let content = locate(head.clone(), spot.relation, spot.landmarks.clone());
         let boxed = || Box::new(content.clone());
         let mut add = |kind, content| {
             let (rel, other, takes) = (spot.rel, spot.noun, vec![spot.takes]);
@@ -328,7 +310,7 @@ fn located(groups: &Groups, spot: &Spot, way: &[String], all: &mut Vec<Proposal>
         add(Kind::NotLocate, Content::Negate(boxed()));
         add(Kind::MendLocate, Content::Correct { was: None, is: boxed() });
         add(Kind::WayTo, Content::Route { steps: way.to_vec(), then: Some(boxed()) });
-        add(Kind::IsLocated, Content::Ask { kind: Question::Whether, about: About::Content(boxed()) });
+        add(Kind::IsLocated, whether(content.clone()));
         if let [landmark] = &spot.landmarks[..] {
             for quantity in [Quantity::All, Quantity::Usually, Quantity::Sometimes, Quantity::Never] {
                 let (figure, landmark) = (head.clone(), landmark.clone());
@@ -346,18 +328,6 @@ fn after_articles(tokens: &[Token], mut at: usize) -> usize {
         at += 1;
     }
     at
-}
-
-/// Some place, told by what is done there: the words behind "where", "to" or "for".
-fn purpose(tokens: &[Token]) -> Phrase {
-    let mut place = Phrase::new(Head::Place);
-    let tells = |t: &Token| matches!(t.text.as_str(), "where" | "for");
-    if let Some(at) = tokens.iter().position(tells) {
-        let is_word = |t: &&Token| !matches!(t.class, Class::Stop | Class::Comma | Class::Question);
-        let said: Vec<&str> = tokens[at + 1..].iter().take_while(is_word).map(|t| t.text.as_str()).collect();
-        place.features.purpose = (!said.is_empty()).then(|| said.join(" "));
-    }
-    place
 }
 
 /// A way, as the relations to landmarks that are said.

@@ -4,6 +4,7 @@ use crate::language::act::{Act, Analysis, Content};
 use crate::language::notation::notation;
 use crate::language::reader::decide::Found;
 use crate::language::reader::judge::Judge;
+use crate::language::reader::propose::PROPOSALS_MAX;
 use crate::language::reader::tokens::MAX_TOKENS;
 
 /// Analyses that are kept, each at least so likely.
@@ -45,7 +46,7 @@ pub fn analyses(text: &str, judge: &Judge) -> Vec<Analysis> {
 
 fn of_whole(text: &str, judge: &Judge) -> Vec<Analysis> {
     let found = Found::new(text);
-    if found.tokens.len() > MAX_TOKENS {
+    if found.tokens.len() > MAX_TOKENS || found.proposals.len() > PROPOSALS_MAX {
         return Vec::new();
     }
     let words: Vec<&str> = found.tokens.iter().map(|t| t.text.as_str()).collect();
@@ -64,7 +65,7 @@ fn analysis(weight: f64, acts: Vec<Act>) -> Analysis {
     Analysis { weight, notation: notation(&acts), acts, hearing: 0 }
 }
 
-/// Whether some acts are of kinds that others are of, too.
+/// Whether what is read is no more than what the grammar has, each act of a kind that it has, too.
 pub fn agree(exact: &[Act], read: &[Act]) -> bool {
     // What mends says what it is mended to.
     let kind = |act: &Act| match &act.content {

@@ -1,7 +1,9 @@
 use crate::language::reader::groups::{Made, groups};
-use crate::language::reader::kind::Kind;
+use crate::language::reader::judge::{Judge, Weights};
+use crate::language::reader::kind::{KINDS, Kind};
 use crate::language::reader::lexicon::lexicon;
-use crate::language::reader::propose::propose;
+use crate::language::reader::propose::{PROPOSALS_MAX, propose};
+use crate::language::reader::read::analyses;
 use crate::language::reader::tokens::{MAX_TOKENS, tokens};
 use crate::language::relation::Relation;
 use proptest::prelude::*;
@@ -41,7 +43,7 @@ fn what_was_misheard_is_what_was_said() {
 }
 
 #[test]
-fn every_kind_is_proposed_and_learned() {
+fn every_kind_is_proposed() {
     let all = tokens("no the gym on the second floor is next to the bar where we eat");
     let kinds: Vec<Kind> = propose(&all, &groups(&all)).iter().map(|p| p.kind).collect();
     for kind in Kind::ALL.into_iter().skip(1) {
@@ -49,12 +51,59 @@ fn every_kind_is_proposed_and_learned() {
     }
 }
 
+#[test]
+fn a_text_that_may_say_too_much_is_not_read() {
+    let text = "the big old gym bar near ".repeat(26);
+    let all = tokens(&text);
+    assert!(propose(&all, &groups(&all)).len() > PROPOSALS_MAX);
+    assert!(analyses(&text, Judge::learned()).is_empty());
+}
+
+#[test]
+fn each_of_several_acts_is_read_once() {
+    let read = |text: &str| analyses(text, Judge::learned()).remove(0).notation;
+    for (text, acts) in [
+        ("this is the kitchen and the pantry is behind it", "label(here,kitchen)&loc(pantry,behind,it)"),
+        (
+            "the bakery is on your left and the bookshop is on your right",
+            "loc(bakery,left_of,agent)&loc(bookshop,right_of,agent)",
+        ),
+        ("the gym is upstairs. the sauna is next to it.", "loc(gym,level_up,here)&loc(sauna,next_to,it)"),
+    ] {
+        assert_eq!(read(text), acts, "{text}");
+    }
+}
+
 proptest! {
+    #[test]
+    fn a_judge_is_what_was_written(
+        kinds in proptest::collection::btree_map(0_u32..1 << 26, -100_i8..100, 0..50),
+        groups in proptest::collection::btree_map(0_u32..1 << 26, -100_i8..100, 0..50),
+    ) {
+        let weight = |w: i8| f32::from(w) / 32.0;
+        let row = |w: i8| { let mut row = [0.0; KINDS]; row[3] = weight(w); row };
+        let judge = Judge::read(&Judge::written(&Weights {
+            kinds: kinds.iter().map(|(f, w)| (*f, row(*w))).collect(),
+            groups: groups.iter().map(|(f, w)| (*f, weight(*w))).collect(),
+        }));
+        let kept = |w: i8| if w.abs() < 2 { 0.0 } else { weight(w) };
+        for (f, w) in &groups {
+            prop_assert!((judge.weight(*f) - kept(*w)).abs() < 1e-6);
+        }
+        for (f, w) in &kinds {
+            let mut sums = [0.0; KINDS];
+            judge.add(*f, &mut sums);
+            prop_assert!((sums[3] - kept(*w)).abs() < 1e-6);
+        }
+    }
+
     #[test]
     fn any_text_has_bounded_proposals(text in "\\PC{0,400}") {
         let all = tokens(&text);
         prop_assert!(all.len() <= MAX_TOKENS + 2);
-        for p in propose(&all, &groups(&all)) {
+        let proposals = propose(&all, &groups(&all));
+        prop_assert!(proposals.len() < 2 * PROPOSALS_MAX + 2000, "{}", proposals.len());
+        for p in proposals {
             prop_assert!(p.takes.iter().all(|s| s.from < s.to.max(1) && s.to <= all.len().max(1)));
         }
     }
