@@ -70,9 +70,25 @@ impl Guide {
     /// # Errors
     /// [`ClientError::Refused`] if it can't be used, [`ClientError::Timeout`] without feedback.
     pub async fn say(&self, text: &str, timeout: Duration) -> Result<Heard, ClientError> {
-        let say = self.sentence(text);
+        self.send(&self.sentence(text), timeout).await
+    }
+
+    /// Says yes or no to what was asked about a sentence.
+    ///
+    /// # Errors
+    /// As [`Guide::say`].
+    pub async fn answer(&self, id: &str, text: &str, timeout: Duration) -> Result<Heard, ClientError> {
+        let say = Say { answers: Some(id.into()), ..self.sentence(text) };
+        self.send(&say, timeout).await
+    }
+
+    /// Publishes a sentence and waits for what became of it.
+    ///
+    /// # Errors
+    /// As [`Guide::say`].
+    pub async fn send(&self, say: &Say, timeout: Duration) -> Result<Heard, ClientError> {
         let (mut feedback, deadline) = (self.feedback(), Instant::now() + timeout);
-        self.publish(&say).await?;
+        self.publish(say).await?;
         loop {
             match timeout_at(deadline, feedback.recv()).await {
                 Ok(Ok(Heard { id, error: Some(error), status: HeardStatus::Refused, .. }))
@@ -85,7 +101,7 @@ impl Guide {
                 // The sender lives as long as this guide, so it can only be late.
                 Ok(Err(RecvError::Closed)) | Err(_) => {
                     return Err(ClientError::Timeout {
-                        what: format!("feedback to {text:?}"),
+                        what: format!("feedback to {:?}", say.text),
                         after: timeout,
                     });
                 }

@@ -203,6 +203,7 @@ fn heard(id: &str, status: HeardStatus, error: Option<Problem>) -> Heard {
         parse: String::new(),
         grounded: Vec::new(),
         words: "I heard".into(),
+        question: None,
         error,
     }
 }

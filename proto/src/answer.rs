@@ -58,8 +58,11 @@ pub struct WhereReply {
 pub struct Resolved {
     /// The name as the map spells it; none if the question names nothing.
     pub label: Option<String>,
-    /// `exact`, `unknown`, or another way of finding it.
+    /// `exact`, `kind`, `synonym`, `sound`, `unknown`, or another way of finding it.
     pub via: String,
+    /// Names that may have been meant where this one is unknown.
+    #[serde(default)]
+    pub suggestions: Vec<String>,
 }
 
 /// A place that may be meant.
@@ -69,6 +72,9 @@ pub struct Candidate {
     pub region: u64,
     /// What it is called.
     pub label: String,
+    /// The same as a guide spells it.
+    #[serde(default)]
+    pub shown: String,
     /// Probability that this one is meant.
     pub probability: f64,
     /// Probability that it is called so.
@@ -146,6 +152,9 @@ pub struct LabelsReply {
 pub struct LabelEntry {
     /// The name.
     pub label: String,
+    /// The same as a guide spells it.
+    #[serde(default)]
+    pub shown: String,
     /// Utterances that spoke of it.
     pub utterances: u64,
     /// Region that most likely bears it.
@@ -339,7 +348,11 @@ mod tests {
             v: ANSWER_VERSION,
             query: "where".into(),
             name: "kitchen".into(),
-            resolved: Resolved { label: Some("kitchen".into()), via: "exact".into() },
+            resolved: Resolved {
+                label: Some("kitchen".into()),
+                via: "exact".into(),
+                suggestions: Vec::new(),
+            },
             map: MapIdentity { id: "h1".into(), ..Default::default() },
             stamp: Stamp { ns: 1_000_000_005 },
             p_none: 0.25,
@@ -347,6 +360,7 @@ mod tests {
             candidates: vec![Candidate {
                 region: 12,
                 label: "kitchen".into(),
+                shown: "kitchen".into(),
                 probability: 0.75,
                 p_is: 0.97,
                 x_m: 4.0,

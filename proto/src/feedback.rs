@@ -19,6 +19,9 @@ pub struct Heard {
     pub grounded: Vec<Grounded>,
     /// In words, for the guide.
     pub words: String,
+    /// What the guide is asked, to be answered by a sentence that `answers` this one: yes or no.
+    #[serde(default)]
+    pub question: Option<String>,
     /// Why it was refused.
     pub error: Option<Problem>,
 }
@@ -29,6 +32,8 @@ pub struct Heard {
 pub enum HeardStatus {
     /// The map knows it.
     Understood,
+    /// The guide is asked something first.
+    Asked,
     /// Nothing changed.
     NotUnderstood,
     /// It could not be used.

@@ -144,6 +144,9 @@ pub struct Say {
     /// Id of an utterance taken back.
     #[serde(default)]
     pub retracts: Option<String>,
+    /// Id of an utterance that something was asked of: this is the answer, "yes" or "no".
+    #[serde(default)]
+    pub answers: Option<String>,
 }
 
 /// A recogniser's other guess.

@@ -183,7 +183,13 @@ fn check_say(say: &Say, limits: &Limits) -> Result<(), Invalid> {
         check_text(&format!("alternatives[{i}].text"), &hearing.text, limits)?;
         check_number(&format!("alternatives[{i}].p"), hearing.p, 0.0, 1.0)?;
     }
-    for (field, token) in [("lang", &say.lang), ("speaker", &say.speaker), ("retracts", &say.retracts)] {
+    let tokens = [
+        ("lang", &say.lang),
+        ("speaker", &say.speaker),
+        ("retracts", &say.retracts),
+        ("answers", &say.answers),
+    ];
+    for (field, token) in tokens {
         if let Some(token) = token {
             check_token(field, token)?;
         }

@@ -48,6 +48,7 @@ pub fn event(message: Message) -> Event {
                 began_ns: began.ns,
                 ended_ns: m.ended.unwrap_or(began).ns,
                 retracts: m.retracts,
+                answers: m.answers,
             })
         }
         Message::End(_) => Event::Flush,
@@ -100,6 +101,7 @@ pub fn heard(h: effects::Heard, durable: bool) -> Heard {
         id: h.id,
         status: match h.status {
             effects::HeardStatus::Understood => HeardStatus::Understood,
+            effects::HeardStatus::Asked => HeardStatus::Asked,
             effects::HeardStatus::NotUnderstood => HeardStatus::NotUnderstood,
             effects::HeardStatus::Refused => HeardStatus::Refused,
         },
@@ -107,6 +109,7 @@ pub fn heard(h: effects::Heard, durable: bool) -> Heard {
         parse: h.parse,
         grounded: h.grounded.into_iter().map(|(place, p)| Grounded { place, p }).collect(),
         words: h.words,
+        question: h.question,
         error: None,
     }
 }
@@ -118,7 +121,7 @@ pub fn where_reply(answer: WhereAnswer, map: MapIdentity, stamp: Stamp, robot: &
         v: ANSWER_VERSION,
         query: "where".into(),
         name: answer.text,
-        resolved: Resolved { label: answer.label, via: answer.via },
+        resolved: Resolved { label: answer.label, via: answer.via, suggestions: answer.suggestions },
         map,
         stamp,
         p_none: answer.p_none,
@@ -132,6 +135,7 @@ fn candidate(c: query::Candidate, from: Option<&Pose2>, robot: &str) -> Candidat
     Candidate {
         region: c.place,
         label: c.label,
+        shown: c.shown,
         probability: c.probability,
         p_is: c.p_is,
         x_m,
@@ -154,7 +158,7 @@ fn candidate(c: query::Candidate, from: Option<&Pose2>, robot: &str) -> Candidat
 pub fn labels_reply(labels: Vec<query::LabelCount>, map: MapIdentity) -> LabelsReply {
     let labels = labels
         .into_iter()
-        .map(|l| LabelEntry { label: l.label, utterances: l.utterances, region: l.place })
+        .map(|l| LabelEntry { label: l.label, shown: l.shown, utterances: l.utterances, region: l.place })
         .collect();
     LabelsReply { v: ANSWER_VERSION, query: "labels".into(), map, labels }
 }
@@ -269,6 +273,7 @@ mod tests {
         let candidate = query::Candidate {
             place: 3,
             label: "gym".into(),
+            shown: "Gym".into(),
             probability: 1.0,
             p_is: 1.0,
             pose: Pose2::new(1.0, 5.0, 0.0),
@@ -282,6 +287,7 @@ mod tests {
             p_none: 0.0,
             unresolved: 0.0,
             candidates: vec![candidate],
+            suggestions: vec![],
             robot: Some(Pose2::new(1.0, 2.0, FRAC_PI_2)),
         };
         let lost = where_reply(

@@ -259,6 +259,7 @@ mod tests {
         let candidate = Candidate {
             region: 1,
             label: "gym".into(),
+            shown: String::new(),
             probability: 0.9,
             p_is: 0.9,
             x_m: 1.0,

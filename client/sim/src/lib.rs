@@ -249,6 +249,7 @@ fn say(k: usize, sentence: &Sentence, robot: &str) -> Say {
         began: Some(began),
         ended: Some(Stamp::from_seconds(sentence.ended_s)),
         retracts: None,
+        answers: None,
     }
 }
 

@@ -74,6 +74,7 @@ struct Fields {
     #[serde(default)]
     alternatives: Vec<Hearing>,
     retracts: Option<String>,
+    answers: Option<String>,
 }
 
 impl Narration {
@@ -143,6 +144,7 @@ fn sentence(line: usize, text: &str) -> Result<Sentence, String> {
         began: None,
         ended: None,
         retracts: fields.retracts,
+        answers: fields.answers,
     };
     Ok(Sentence { began, say })
 }

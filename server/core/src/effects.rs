@@ -29,6 +29,8 @@ pub enum TrackState {
 pub enum HeardStatus {
     /// It changed the map, or would have, were it not a repetition.
     Understood,
+    /// The guide is asked first, see [`Heard::question`].
+    Asked,
     /// Nothing changed.
     NotUnderstood,
     /// It was understood but can't be used (no place yet, a full ledger, language off).
@@ -52,6 +54,8 @@ pub struct Heard {
     pub grounded: Vec<(PlaceId, f64)>,
     /// In words, for the guide.
     pub words: String,
+    /// What the guide is asked: yes or no. It is said in the words, too.
+    pub question: Option<String>,
 }
 
 /// One consequence of an event.

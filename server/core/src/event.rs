@@ -100,6 +100,8 @@ pub struct Utterance {
     pub ended_ns: StampNs,
     /// Id of a sentence that this one takes back.
     pub retracts: Option<String>,
+    /// Id of a sentence of which the robot asked something: this is the answer.
+    pub answers: Option<String>,
 }
 
 /// What an operator mends at a desk.

@@ -4,7 +4,7 @@
 
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::{FRAC_PI_4, PI, TAU};
 
 /// Wraps an angle to (−π, π].
 pub fn wrap(angle_rad: f64) -> f64 {
@@ -116,6 +116,23 @@ pub fn relative_covariance(
     let h = -b.between(a).adjoint();
     let m = h * cov_a * h.transpose() + h * cross_ab + (h * cross_ab).transpose() + cov_b;
     (m + m.transpose()) * 0.5
+}
+
+/// Directions from a robot's nose, by eighths to the left.
+const SIDES: [&str; 8] = [
+    "straight ahead",
+    "ahead on the left",
+    "on the left",
+    "behind on the left",
+    "behind",
+    "behind on the right",
+    "on the right",
+    "ahead on the right",
+];
+
+/// A bearing in words.
+pub fn side(bearing_rad: f64) -> &'static str {
+    SIDES[((bearing_rad / FRAC_PI_4).round() as i32).rem_euclid(8) as usize]
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@ mod standing;
 mod unseen;
 
 use crate::answers::snapshot::{Now, Snapshot, open_poses};
+use crate::answers::spoken;
 use crate::edge::Vertex;
 use crate::effects::{Effect, Effects};
 use crate::event::{Odom, Scan, StampNs, Utterance};
@@ -69,7 +70,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 9 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 10 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -259,7 +260,17 @@ impl Mapper {
         };
         let (part, dark) = self.parts(&open);
         let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m, part, dark };
-        self.change(effects, |filter, talk| vec![Effect::Heard(talk.hear(filter, u, &here))]);
+        let mut heard = None;
+        self.change(effects, |filter, talk| {
+            heard = Some(talk.hear(filter, u, &here));
+            Effects::new()
+        });
+        if let Some((mut heard, asks)) = heard {
+            if !asks.is_empty() {
+                heard.words = spoken::answers(&self.snapshot(), &asks, &heard.words);
+            }
+            effects.push(Effect::Heard(heard));
+        }
         self.stand(effects);
     }
 

@@ -25,17 +25,22 @@ const ROOMS: [&str; 17] = [
     "mapper",
 ];
 /// The same within `language`.
-const LANGUAGE: [&str; 12] = [
+const LANGUAGE: [&str; 17] = [
     "measure",
     "relation",
     "lexicon",
+    "spelling",
+    "reply",
     "act",
     "notation",
     "words",
     "reference",
     "grammar",
     "reader",
+    "likeness",
     "understand",
+    "phrases",
+    "ellipsis",
     "grounding",
     "clauses",
 ];

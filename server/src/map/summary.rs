@@ -116,6 +116,12 @@ pub fn told(answer: &WhereAnswer) -> String {
     if more > 0 {
         let _ = writeln!(text, "         and {more} more");
     }
+    if answer.label.is_none() {
+        return text + "         not understood: name a place, or ask where it is\n";
+    }
+    if !answer.suggestions.is_empty() {
+        let _ = writeln!(text, "         unknown; did you mean {}?", answer.suggestions.join(" or "));
+    }
     if answer.p_none >= 0.005 || answer.candidates.is_empty() {
         let _ = writeln!(text, "  {:>3.0} %  nowhere in this map", 100.0 * answer.p_none);
     }
@@ -135,6 +141,7 @@ mod tests {
             p_none: 1.0,
             unresolved: 0.0,
             candidates: vec![],
+            suggestions: vec![],
             robot: None,
         };
         assert_eq!(told(&answer), "where is the pool\n  100 %  nowhere in this map\n");

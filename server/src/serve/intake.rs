@@ -314,6 +314,7 @@ impl Intake {
             parse: String::new(),
             grounded: Vec::new(),
             words: format!("I can't use that: {}.", problem.message),
+            question: None,
             error: Some(problem),
         };
         self.outbox.tell(self.keys.heard(robot), &heard);

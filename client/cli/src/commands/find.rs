@@ -78,17 +78,27 @@ fn print(text: &str) -> Result<(), Failure> {
 
 fn where_text(reply: &WhereReply) -> String {
     let Some((best, others)) = reply.candidates.split_first() else {
-        return format!("{}: not known here; `toponym labels` lists what is\n", reply.name);
+        let suggestions = &reply.resolved.suggestions;
+        let offer = if suggestions.is_empty() {
+            "`toponym labels` lists what is".to_owned()
+        } else {
+            format!("did you mean {}?", suggestions.join(" or "))
+        };
+        return format!("{}: not known here; {offer}\n", reply.name);
     };
-    let mut text = format!("{}: {}\n", best.label, candidate_text(best));
-    let shown = others.iter().filter(|c| c.probability >= SHOWN_MIN);
-    for other in shown {
-        let _ = writeln!(text, "  or {}: {}", other.label, candidate_text(other));
+    let mut text = format!("{}: {}\n", shown(best), candidate_text(best));
+    for other in others.iter().filter(|c| c.probability >= SHOWN_MIN) {
+        let _ = writeln!(text, "  or {}: {}", shown(other), candidate_text(other));
     }
     if reply.p_none >= SHOWN_MIN {
         let _ = writeln!(text, "  or nowhere in the map: probability {:.2}", reply.p_none);
     }
     text
+}
+
+/// Its name as a guide spells it.
+fn shown(c: &Candidate) -> &str {
+    if c.shown.is_empty() { &c.label } else { &c.shown }
 }
 
 fn candidate_text(c: &Candidate) -> String {
@@ -130,6 +140,7 @@ mod tests {
         Candidate {
             region: 1,
             label: "gym".into(),
+            shown: "gym".into(),
             probability,
             p_is: 0.9,
             x_m: 1.0,
@@ -196,7 +207,12 @@ mod tests {
 
     #[test]
     fn labels_are_a_table() {
-        let label = |label: &str, utterances| LabelEntry { label: label.into(), utterances, region: 3 };
+        let label = |label: &str, utterances| LabelEntry {
+            label: label.into(),
+            shown: label.into(),
+            utterances,
+            region: 3,
+        };
         let mut reply = LabelsReply {
             v: 1,
             query: "labels".into(),

@@ -4,6 +4,7 @@ use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::time::Duration;
 use toponym::{Guide, Planner};
+use toponym_proto::Say;
 use toponym_proto::answer::{GraphReply, Heard, HeardStatus};
 
 /// Arguments of `say`.
@@ -13,8 +14,11 @@ Examples:
   toponym say 'this is the gym'
   toponym say 'the library is down the hall' --robot r07 --speaker anna
   toponym say 'the lab is past the stairs' --explain
+  toponym say 'where is the gym?'
+  toponym say 'scratch that'
 
-It speaks of the place where the robot is now. Exit code 1 if it was not understood.")]
+It speaks of the place where the robot is now. Exit code 1 if it was not understood, or if the robot asks something
+back: say yes or no, at once or with --answers and the sentence's id.")]
 pub struct SayArgs {
     /// The sentence.
     text: String,
@@ -24,6 +28,9 @@ pub struct SayArgs {
     /// Who says it.
     #[arg(long)]
     speaker: Option<String>,
+    /// Id of the sentence that the robot asked something of: this is the answer.
+    #[arg(long, value_name = "ID")]
+    answers: Option<String>,
     /// Tell how the sentence was read and where it was put.
     #[arg(long)]
     explain: bool,
@@ -39,15 +46,19 @@ pub async fn say(endpoint: &str, site: &str, args: &SayArgs) -> Result<u8, Failu
     let session = toponym::open(endpoint).await?;
     let mut guide = Guide::connect(&session, site, args.robot.as_deref()).await?;
     guide.speaker.clone_from(&args.speaker);
-    let heard = guide.say(&args.text, args.timeout).await?;
+    let say = Say { answers: args.answers.clone(), ..guide.sentence(&args.text) };
+    let heard = guide.send(&say, args.timeout).await?;
     println!("{}", heard.words);
+    if heard.status == HeardStatus::Asked {
+        println!("Answer with: toponym say yes --answers {}   (or no)", heard.id);
+    }
     if args.explain {
         let planner = Planner::new(&session, site, &args.map, args.timeout)?;
         print!("{}", explained(&heard, &planner.graph().await?));
     }
     Ok(match heard.status {
         HeardStatus::Understood => exit::FOUND,
-        HeardStatus::NotUnderstood => exit::NOT_KNOWN,
+        HeardStatus::Asked | HeardStatus::NotUnderstood => exit::NOT_KNOWN,
         HeardStatus::Refused => exit::REFUSED,
     })
 }
@@ -84,6 +95,7 @@ mod tests {
             parse: "loc(lab,past,stairs)".into(),
             grounded: vec![Grounded { place: 7, p: 0.6 }],
             words: String::new(),
+            question: None,
             error: None,
         };
         let place = Place { id: 7, x_m: 1.0, y_m: -2.0, ..Place::default() };

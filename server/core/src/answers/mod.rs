@@ -2,7 +2,9 @@
 
 pub mod differences;
 pub mod grid;
+mod meaning;
 pub mod query;
 pub mod snapshot;
+pub mod spoken;
 pub mod trajectory;
 pub mod whereabouts;

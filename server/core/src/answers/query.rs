@@ -46,7 +46,8 @@ pub struct WhereAnswer {
     /// The name asked for, as the map spells it (`elevator lobby`); none if the question was not
     /// understood.
     pub label: Option<String>,
-    /// How the name was found: `exact` or `unknown`.
+    /// How the name was found: `exact`; `kind`, as that of names which nobody asked for by themselves ("archive" for
+    /// the old archive); `synonym`; `sound`, as a misheard one; or `unknown`.
     pub via: String,
     /// Probability that it is nowhere in the map, or that the map is none of those kept. Sums to one with
     /// the candidates'.
@@ -55,6 +56,8 @@ pub struct WhereAnswer {
     pub unresolved: f64,
     /// Best first.
     pub candidates: Vec<Candidate>,
+    /// Names that may have been meant where this one is unknown.
+    pub suggestions: Vec<String>,
     /// Newest pose of the robot in the map, if it has one and is not lost.
     pub robot: Option<Pose2>,
 }
@@ -66,6 +69,8 @@ pub struct Candidate {
     pub place: PlaceId,
     /// What it is called.
     pub label: String,
+    /// The same as a guide spells it: `Nick's Office`.
+    pub shown: String,
     /// Probability that this one is meant.
     pub probability: f64,
     /// Probability that the name applies to it.
@@ -83,6 +88,8 @@ pub struct Candidate {
 pub struct LabelCount {
     /// The name.
     pub label: String,
+    /// The same as a guide spells it.
+    pub shown: String,
     /// Utterances that spoke of it.
     pub utterances: u64,
     /// Place that most likely bears it.

@@ -2,11 +2,12 @@
 
 use crate::answers::differences::differences;
 use crate::answers::grid::grid;
+use crate::answers::meaning::{Meaning, meaning};
 use crate::answers::query::{
     Answer, Candidate, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query,
     WhereAnswer,
 };
-use crate::answers::whereabouts::{Region, SAME_REGION_M, Whereabouts, whereabouts};
+use crate::answers::whereabouts::{Region, SAME_REGION_M, whereabouts};
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
 use crate::filter::Filter;
@@ -21,7 +22,7 @@ use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::places::OpenPlace;
 use nalgebra::Matrix3;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Candidates told.
@@ -179,6 +180,7 @@ impl Snapshot {
             utterances.dedup();
             out.push(LabelCount {
                 label: label.clone(),
+                shown: self.ledger.spelled(label).to_owned(),
                 utterances: utterances.len() as u64,
                 place: PlaceId::from(place),
             });
@@ -218,28 +220,78 @@ impl Snapshot {
 
     /// "Where is the gym?": over all particles, which place is meant.
     fn where_is(&self, text: &str) -> WhereAnswer {
-        let name = language::parse_query(text);
-        let label = name.as_ref().and_then(|n| self.ledger.label(n.as_str()));
-        let mut answer = WhereAnswer {
-            text: text.to_owned(),
-            label: name.map(|n: Name| n.as_str().to_owned()),
-            via: if label.is_some() { "exact" } else { "unknown" }.to_owned(),
+        let found = language::parse_query(text).map(|name| self.where_named(&name));
+        WhereAnswer { text: text.to_owned(), ..found.unwrap_or_else(|| self.nowhere(None)) }
+    }
+
+    fn nowhere(&self, name: Option<&Name>) -> WhereAnswer {
+        WhereAnswer {
+            text: name.map_or_else(String::new, |n| n.as_str().to_owned()),
+            label: name.map(|n| n.as_str().to_owned()),
+            via: "unknown".to_owned(),
             p_none: 1.0,
             unresolved: self.unresolved,
             candidates: Vec::new(),
+            suggestions: Vec::new(),
             // Who is lost is nowhere to count distances from.
             robot: self.now.robot.filter(|_| self.now.state != TrackState::Lost),
-        };
-        let Some(label) = label else { return answer };
+        }
+    }
+
+    /// Where is what people may mean by a name.
+    pub(crate) fn where_named(&self, name: &Name) -> WhereAnswer {
+        let Meaning { via, p, labels, suggestions } = meaning(name, &self.ledger, &self.known());
+        let names = |ids: Vec<LabelId>| ids.iter().map(|&id| self.ledger.name(id).to_owned()).collect();
+        let (via, suggestions) = (via.to_owned(), names(suggestions));
+        let mut answer = WhereAnswer { via, suggestions, ..self.nowhere(Some(name)) };
         let poses = |p: &Particle| poses(p, &self.places, &self.open);
-        let Whereabouts { mut regions, .. } = whereabouts(&self.particles, poses, label, PROBABILITY_MIN);
-        regions.retain(|r| r.p_is >= PROBABILITY_MIN);
-        regions.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
-        regions.truncate(CANDIDATES_MAX);
+        let found = |&label: &LabelId| {
+            let found = whereabouts(&self.particles, poses, label, PROBABILITY_MIN);
+            (label, found.regions, found.p_none)
+        };
+        let found: Vec<(LabelId, Vec<Region>, f64)> = labels.iter().map(found).collect();
+        // One place is meant: names that are as likely share it, as far as each is anywhere.
+        let somewhere: f64 = found.iter().map(|(.., p_none)| 1.0 - p_none).sum();
+        let share = p * self.resolved() / somewhere.max(1.0);
+        let mut all: Vec<(LabelId, Region)> = Vec::new();
+        for (label, regions, _) in found {
+            let likely = regions.into_iter().filter(|r| r.p_is >= PROBABILITY_MIN);
+            all.extend(likely.map(|r| (label, Region { probability: share * r.probability, ..r })));
+        }
+        all.sort_by(|(_, a), (_, b)| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
+        all.truncate(CANDIDATES_MAX);
         // None of those told: of the others each is next to impossible.
-        answer.p_none = 1.0 - regions.iter().map(|r| self.resolved() * r.probability).sum::<f64>();
-        answer.candidates = regions.into_iter().map(|r| self.candidate(label, r)).collect();
+        answer.p_none = 1.0 - all.iter().map(|(_, r)| r.probability).sum::<f64>();
+        answer.candidates = all.into_iter().map(|(label, r)| self.candidate(label, r)).collect();
         answer
+    }
+
+    /// Names that something speaks for, in the order first said.
+    fn known(&self) -> Vec<LabelId> {
+        let evidence = self.particles.iter().flat_map(|p| p.labels.evidence());
+        let known: BTreeSet<LabelId> = evidence.filter(|e| e.weight > 0.0).map(|e| e.label).collect();
+        known.into_iter().filter(|&id| !self.ledger.name(id).is_empty()).collect()
+    }
+
+    /// Names of places so near a pose of the best map, but for one, each with the most that it applies to any of
+    /// them; likeliest first.
+    pub(crate) fn called_around(&self, pose: &Pose2, reach_m: f64, but: Option<&str>) -> Vec<(String, f64)> {
+        let near = (0..self.poses.len()).filter(|&v| self.poses[v].distance_m(pose) < reach_m);
+        let mut names: BTreeMap<String, f64> = BTreeMap::new();
+        for (name, p) in near.flat_map(|v| self.names_of(v as Vertex)) {
+            let most = names.entry(name).or_insert(0.0);
+            *most = most.max(p);
+        }
+        let mut names: Vec<_> = names.into_iter().filter(|(name, _)| Some(name.as_str()) != but).collect();
+        names.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+        names
+    }
+
+    /// A name as one says it, spelled as the guide does.
+    pub(crate) fn spoken(&self, name: &str) -> String {
+        let Some(canonical) = Name::new(name) else { return name.to_owned() };
+        let article = if canonical.with_article() == canonical.as_str() { "" } else { "the " };
+        format!("{article}{}", self.ledger.spelled(name))
     }
 
     /// Share of the posterior that the particles stand for; what was pruned and may yet be true is none of
@@ -252,7 +304,8 @@ impl Snapshot {
         Candidate {
             place: PlaceId::from(place),
             label: self.ledger.name(label).to_owned(),
-            probability: self.resolved() * probability,
+            shown: self.ledger.spelled(self.ledger.name(label)).to_owned(),
+            probability,
             p_is,
             pose: self.poses[place as usize],
             covariance: self.covariance(place),

@@ -159,7 +159,7 @@ impl Map {
     /// Probability that the name applies nowhere: what was said of no region is true, and no description is put
     /// anywhere. A description means one place, so its places are no witnesses of one another.
     fn nowhere(&self, regions: impl Iterator<Item = Spoken>) -> f64 {
-        let unsaid: f64 = regions.map(|spoken| 1.0 - spoken.tally.applies()).product();
+        let unsaid: f64 = regions.map(|spoken| 1.0 - spoken.tally.told()).product();
         let put = |of_utterance: &Vec<Evidence>| {
             let grounded = of_utterance.iter().filter(|e| e.source == Source::Grounded);
             grounded.map(|e| e.weight).sum::<f64>().clamp(0.0, 1.0)

@@ -316,7 +316,7 @@ mod tests {
         l.add(said(0, 0, 3, Source::Direct));
         l.carry_over(3, 50);
         l.carry_over(3, 51);
-        assert_eq!(l.names(50)[&0], Tally { said: CARRIED, denied: 0.0 }.applies());
+        assert_eq!(l.names(50)[&0], Tally { said: CARRIED, denied: 0.0 }.told());
         assert!(l.names(51).is_empty());
     }
 

@@ -158,9 +158,14 @@ impl Tally {
         (self.said - self.denied).max(0.0)
     }
 
-    /// P(name applies).
+    /// P(name applies), as α_l has it.
     pub fn applies(self) -> f64 {
         self.concentration() / (self.concentration() + DOUBT)
+    }
+
+    /// P(name applies) for who is told of it: what one utterance may have said is as likely as that it said so.
+    pub fn told(self) -> f64 {
+        self.concentration() / (self.concentration().max(1.0) + DOUBT)
     }
 
     /// f_l: what denial leaves of the name's share in the base measure.
@@ -198,7 +203,7 @@ impl Spoken {
 
     /// P(name applies).
     pub fn applies(self) -> f64 {
-        1.0 - (1.0 - self.tally.applies()) * (1.0 - self.described())
+        1.0 - (1.0 - self.tally.told()) * (1.0 - self.described())
     }
 }
 

@@ -19,14 +19,19 @@
 
 pub mod act;
 pub(crate) mod clauses;
+mod ellipsis;
 pub(crate) mod grammar;
 pub(crate) mod grounding;
 pub(crate) mod lexicon;
+mod likeness;
 mod measure;
 mod notation;
+mod phrases;
 pub mod reader;
 mod reference;
 mod relation;
+mod reply;
+mod spelling;
 #[cfg(test)]
 mod tests;
 mod understand;
@@ -34,6 +39,8 @@ mod words;
 
 pub use act::{Act, Analysis, Content, Frame, Parse, Phrase, Sameness};
 pub use clauses::{Clause, clauses};
+pub use ellipsis::as_before;
+pub use grammar::ask::asked_name;
 pub use grounding::clause::{LandmarkBelief, Narrowing, Reading};
 pub use grounding::footprint::Footprint;
 pub use grounding::ground::{Grounding, ground_clause, ground_with};
@@ -41,12 +48,19 @@ pub use grounding::paper::ground_by_paper;
 pub use grounding::path_features::{FEATURES, path_features};
 pub use grounding::place::GroundPlace;
 pub use grounding::scales::Scales;
+pub use lexicon::edits::edits;
 pub use lexicon::names::Name;
 pub use lexicon::normalise::MAX_TEXT_BYTES;
+pub use lexicon::numbers::is_number;
+pub use lexicon::place_names;
+pub use likeness::{is_of_kind, misheard, synonyms};
+pub use phrases::{names_in, renamed};
 pub use reference::{pointed_to, resolve_it, seen_from_here, topic};
 pub use relation::Relation;
-pub use understand::{parse, parse_by, parse_hearings, parse_query};
-pub use words::{NOT_UNDERSTOOD, words};
+pub use reply::{Reply, reply};
+pub use spelling::spelling;
+pub use understand::{guess, parse, parse_by, parse_hearings, parse_query};
+pub use words::{NOT_UNDERSTOOD, statement, words};
 
 /// An act in writing.
 pub fn written(content: &Content) -> String {

@@ -3,13 +3,14 @@
 //! A sentence that the grammar reads whole says what it reads, unless the reader is sure of something else. Others
 //! say what the reader makes of them if that is likely enough: half understood is not understood.
 
-use crate::language::act::{Analysis, Content, Head, Parse, Phrase};
+use crate::language::act::{Act, Analysis, Content, Head, Parse, Phrase};
 use crate::language::grammar::ask::asked_name;
 use crate::language::grammar::cursor::Cursor;
 use crate::language::grammar::parse;
 use crate::language::grammar::sentence::{FILLERS, TAGS};
 use crate::language::lexicon::names::{Kind, Name};
 use crate::language::lexicon::normalise::{MAX_TEXT_BYTES, sentences};
+use crate::language::notation::notation;
 use crate::language::reader::judge::Judge;
 use crate::language::reader::read::{agree, analyses};
 use crate::language::reader::tokens::tokens;
@@ -18,6 +19,8 @@ use crate::language::reader::tokens::tokens;
 const ANALYSES_MAX: usize = 8;
 /// What the reader makes of a text is heard from so likely on: likelier than not.
 pub const HEARD: f64 = 0.5;
+/// From so likely on it is worth asking whether that was meant.
+const ASKED: f64 = 0.25;
 /// What names something that the lexicon takes for no place is believed from so likely on.
 const ODD: f64 = 0.9;
 /// So likely, another reading than the grammar's is preferred.
@@ -31,6 +34,14 @@ pub fn parse(text: &str) -> Parse {
 
 /// As [`parse`], by another judge.
 pub fn parse_by(text: &str, judge: &Judge) -> Parse {
+    let mut read = read_by(text, judge);
+    if says_no_longer(text) {
+        read.analyses.iter_mut().for_each(left_behind);
+    }
+    read
+}
+
+fn read_by(text: &str, judge: &Judge) -> Parse {
     let exact = parse::parse(text);
     if text.len() > MAX_TEXT_BYTES {
         return exact;
@@ -62,6 +73,37 @@ fn said(text: &str, read: Vec<Analysis>) -> Parse {
     Parse {
         analyses: if heard { read.into_iter().filter(|a| !a.acts.is_empty()).collect() } else { Vec::new() },
     }
+}
+
+/// What a text may say of which nothing is likely enough to be heard: worth asking.
+pub fn guess(text: &str) -> Option<Analysis> {
+    let likely = |a: &Analysis| !a.acts.is_empty() && a.weight >= ASKED;
+    let best = analyses(text, Judge::learned()).into_iter().find(likely)?;
+    let is_of_now = |act: &Act| is_of_here(&act.content) && foretells(text);
+    let is_sane = !best.acts.iter().any(|act| is_odd(&act.content) || is_of_now(act));
+    is_sane.then_some(best)
+}
+
+/// "This isn't the gym any more": it was, and what was said of it holds.
+fn says_no_longer(text: &str) -> bool {
+    let words = tokens(text);
+    let is = |at: usize, word: &str| words.get(at).is_some_and(|t| t.text == word);
+    (0..words.len()).any(|at| {
+        is(at, "anymore") || is(at, "any") && is(at + 1, "more") || is(at, "no") && is(at + 1, "longer")
+    })
+}
+
+/// What is called something else by now corrects nothing.
+fn left_behind(reading: &mut Analysis) {
+    for act in &mut reading.acts {
+        if let Content::Correct { was, is } = &act.content
+            && was.as_deref().is_none_or(is_of_here)
+            && is_of_here(is)
+        {
+            act.content = (**is).clone();
+        }
+    }
+    reading.notation = notation(&reading.acts);
 }
 
 /// Whether it says what will be: that is nothing of here and now.

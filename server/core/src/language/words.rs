@@ -18,10 +18,8 @@ pub fn words(acts: &[Act], known: impl Fn(&Name) -> bool) -> String {
         [Act { content: Content::Ignored(reason), .. }] => return ignored(*reason).to_owned(),
         _ => {}
     }
-    let heard: Vec<String> =
-        acts.iter().map(|a| format!("{}{}", doubt(a.certainty), clause(&a.content))).collect();
     let question = matches!(acts.last(), Some(Act { content: Content::Ask { .. }, .. }));
-    let mut text = format!("I heard: {}{}", heard.join(", and "), if question { "?" } else { "." });
+    let mut text = format!("I heard: {}{}", statement(acts), if question { "?" } else { "." });
     let mut missing: Vec<Name> = Vec::new();
     for act in acts {
         let Content::Locate(locate) = &act.content else { continue };
@@ -33,6 +31,13 @@ pub fn words(acts: &[Act], known: impl Fn(&Name) -> bool) -> String {
         }
     }
     text
+}
+
+/// What the acts say, without a full stop: "the gym is down the hallway".
+pub fn statement(acts: &[Act]) -> String {
+    let said: Vec<String> =
+        acts.iter().map(|a| format!("{}{}", doubt(a.certainty), clause(&a.content))).collect();
+    said.join(", and ")
 }
 
 fn ignored(reason: Reason) -> &'static str {

@@ -369,7 +369,7 @@ mod tests {
                 dark: vec![],
             };
             let u = Utterance { id: text.into(), text: text.into(), ..Utterance::default() };
-            assert_eq!(talk.hear(&mut filter, &u, &here).status, HeardStatus::Understood);
+            assert_eq!(talk.hear(&mut filter, &u, &here).0.status, HeardStatus::Understood);
         }
         let length_m = |p: &Particle| p.belief.pose(20).x_m;
         let (near, apart): (Vec<_>, Vec<_>) = filter.particles.iter().partition(|p| length_m(p) < 10.0);

@@ -40,6 +40,8 @@ pub struct Ledger {
     aliases: BTreeMap<LabelId, (LabelId, Option<u32>)>,
     /// Names that nothing said before an utterance speaks of any more.
     forgotten: BTreeMap<LabelId, u32>,
+    /// How guides spell names that have capitals or other signs.
+    spelled: BTreeMap<String, String>,
     entries: Vec<Entry>,
     ids: BTreeSet<String>,
     /// Utterances that describe, oldest first.
@@ -66,6 +68,11 @@ impl Ledger {
     /// The spelling of a name.
     pub fn name(&self, label: LabelId) -> &str {
         self.names.get(label as usize).map_or("", String::as_str)
+    }
+
+    /// A name as guides spell it: "Nick's Office".
+    pub fn spelled<'a>(&'a self, name: &'a str) -> &'a str {
+        self.spelled.get(name).map_or(name, String::as_str)
     }
 
     /// All names in the order first said.
@@ -127,6 +134,11 @@ impl Ledger {
         self.names.push(name.as_str().to_owned());
         self.by_name.insert(name.as_str().to_owned(), id);
         id
+    }
+
+    /// From now on a name is spelled so.
+    pub(crate) fn spell(&mut self, name: &Name, spelled: String) {
+        self.spelled.insert(name.as_str().to_owned(), spelled);
     }
 
     /// Takes an utterance back.

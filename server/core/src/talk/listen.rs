@@ -1,181 +1,148 @@
 //! Step 3 of Algorithm 1, the sentences: what each says and what becomes of it.
 
-use crate::edge::{PlaceId, Vertex};
 use crate::effects::{Heard, HeardStatus};
 use crate::event::{StampNs, Utterance};
 use crate::filter::Filter;
-use crate::filter::labels::Source;
-use crate::language;
-use crate::language::act::{Content, Head, Parse, Phrase};
-use crate::talk::describe::located;
-use crate::talk::ledger::{Entry, UTTERANCES_MAX};
+use crate::language::act::{Act, Analysis, Content, Parse, Phrase};
+use crate::language::{self, Name, Reply};
+use crate::talk::accept::{asked, heard, take, words};
+use crate::talk::doubts::doubted;
+use crate::talk::ledger::Entry;
 use crate::talk::mend::undo;
-use crate::talk::take_in::take_in;
+use crate::talk::questions::{Question, Said, Then};
+use crate::talk::replied::{answered, undone};
 use crate::talk::{Here, Talk};
-use std::collections::BTreeMap;
-use std::f64::consts::FRAC_PI_4;
-use std::sync::Arc;
 
-/// Groundings told to the guide.
-const GROUNDED_TOLD: usize = 5;
+/// How likely a guide means what was asked for and confirmed: "yes" may be misheard, too.
+const CONFIRMED: f64 = 0.95;
+
+/// What was named no longer ago is mended by what sounds like it, so likely.
+const MENDED_NS: i64 = 20_000_000_000;
+const MENDS: f64 = 0.8;
 
 /// "It" is what was spoken of no longer ago.
 const TOPIC_NS: i64 = 60_000_000_000;
-/// Less is "not seen yet".
-const NOT_SEEN_MAX: f64 = 0.3;
-/// A place that nobody can tell.
-const WHICH: &str = " But I can't tell which place that is: say it when we are there.";
-/// So near is "here".
-const HERE_M: f64 = 2.0;
-/// Directions from a robot's nose, by eighths to the left.
-const SIDES: [&str; 8] = [
-    "straight ahead",
-    "ahead on the left",
-    "on the left",
-    "behind on the left",
-    "behind",
-    "behind on the right",
-    "on the right",
-    "ahead on the right",
-];
-
-/// Takes a sentence: parses it, weighs every particle by it and updates its labels.
-pub(crate) fn hear(talk: &mut Talk, filter: &mut Filter, u: &Utterance, here: &Here) -> Heard {
+/// Takes a sentence: parses it, weighs every particle by it and updates its labels. With it what is asked of the map.
+pub(crate) fn hear(
+    talk: &mut Talk,
+    filter: &mut Filter,
+    u: &Utterance,
+    here: &Here,
+) -> (Heard, Vec<Content>) {
     if !filter.config.language {
         let words = "Nobody listens: language is switched off.".to_owned();
-        return heard(u, HeardStatus::Refused, &Parse::default(), words);
+        return (heard(u, HeardStatus::Refused, &Parse::default(), words), Vec::new());
+    }
+    if let Some(question) = talk.questions.about(&u.id) {
+        return (asked(u, &Parse::default(), question.words.clone()), Vec::new());
     }
     if talk.ledger.has(&u.id) {
         let parse = language::parse_hearings(&u.text, &u.alternatives);
         let words = format!("{} (I had heard that already.)", words(talk, &parse));
-        return heard(u, HeardStatus::Understood, &parse, words);
+        return (heard(u, HeardStatus::Understood, &parse, words), Vec::new());
     }
     let retracted = u
         .retracts
         .as_ref()
         .map(|id| undo(talk, filter, Some(id)).unwrap_or_else(|why| format!("But {why}.")));
-    let mut heard = hear_anew(talk, filter, u, here);
+    let (mut heard, asks) = match talk.questions.answered(u) {
+        Some((question, then)) => answered(talk, filter, u, here, (&question, then)),
+        None if language::reply(&u.text) == Some(Reply::Undo) => (undone(talk, filter, u, here), Vec::new()),
+        None => hear_anew(talk, filter, u, here),
+    };
     if let Some(retracted) = retracted {
         heard.words = format!("{retracted} {}", heard.words);
     }
-    heard
+    (heard, asks)
 }
 
-fn hear_anew(talk: &mut Talk, filter: &mut Filter, u: &Utterance, here: &Here) -> Heard {
+fn hear_anew(talk: &mut Talk, filter: &mut Filter, u: &Utterance, here: &Here) -> (Heard, Vec<Content>) {
     let mut parse = language::parse_hearings(&u.text, &u.alternatives);
     language::resolve_it(&mut parse, topic(talk, u.began_ns));
-    let words = words(talk, &parse);
+    let said = |parse, held, instead_of| {
+        let (text, stamp_ns) = (u.text.clone(), u.began_ns);
+        Said { text, parse, stamp_ns, held, instead_of }
+    };
+    let newest = newest(talk, u.began_ns);
+    if parse.acts().is_empty()
+        && let Some(said_before) = newest.and_then(|e| language::as_before(&u.text, &e.parse))
+    {
+        parse = said_before;
+    }
+    if parse.acts().is_empty()
+        && let Some(mended) = newest.and_then(|e| mended(&u.text, e, u.began_ns))
+    {
+        parse.analyses.push(mended);
+    }
     if parse.acts().iter().all(|act| matches!(act.content, Content::Ignored(_))) {
-        return heard(u, HeardStatus::NotUnderstood, &parse, words);
+        if let (Some(guess), Some(held)) = (language::guess(&u.text), here.held) {
+            let words = did_you_mean(&guess);
+            let mut parse = Parse { analyses: vec![guess] };
+            language::resolve_it(&mut parse, topic(talk, u.began_ns));
+            let told = parse.clone();
+            parse.analyses[0].weight = CONFIRMED;
+            let then = [Then::Take(said(parse, held, None)), Then::Nothing];
+            return (put_question(talk, u, &told, (words, then, [const { None }; 2])), Vec::new());
+        }
+        let words = words(talk, &parse);
+        return (heard(u, HeardStatus::NotUnderstood, &parse, words), Vec::new());
     }
-    if !parse.acts().iter().any(|act| act.content.asserts()) {
-        return heard(u, HeardStatus::Understood, &parse, words);
-    }
-    let Some(held) = here.held else {
-        let words = format!("{words} But I have seen nothing yet: say it again when I have moved.");
-        return heard(u, HeardStatus::Refused, &parse, words);
+    let doubt = here.held.and_then(|held| Some((held, doubted(talk, filter, &parse, held, here)?)));
+    let Some((held, doubt)) = doubt else {
+        return take(talk, filter, (u, said(parse, here.held.unwrap_or_default(), None)), here);
     };
-    if talk.ledger.is_full() {
-        let words = format!("{words} But I can't keep more than {UTTERANCES_MAX} sentences.");
-        return heard(u, HeardStatus::Refused, &parse, words);
+    let [yes, no] = [doubt.yes, doubt.no];
+    let (mut heard, asks) = take(talk, filter, (u, said(doubt.meanwhile, held, None)), here);
+    if heard.status == HeardStatus::Understood {
+        let number = talk.ledger.standing(Some(&u.id));
+        let then = [Then::Take(said(yes, held, number)), Then::Take(said(no, held, number))];
+        let question = put_question(talk, u, &Parse::default(), (doubt.words, then, doubt.names));
+        heard.status = HeardStatus::Asked;
+        heard.words = question.words;
+        heard.question = question.question;
     }
-    let entry = Entry {
-        id: u.id.clone(),
-        stamp_ns: u.began_ns,
-        text: u.text.clone(),
-        parse: parse.clone(),
-        held,
-        stands: true,
-    };
-    let describes = !located(&parse).is_empty();
-    let number = Arc::make_mut(&mut talk.ledger).enter(entry, describes);
-    take_in(talk, filter, (number, &parse, held), here);
-    let mut heard = heard(u, HeardStatus::Understood, &parse, words);
-    heard.grounded = told(filter, number);
-    heard.words += unplaced(&parse);
-    if describes {
-        heard.words += &put(filter, number, held, here);
-    }
-    heard
+    (heard, asks)
 }
 
-/// What the newest sentence spoke of, if that is not too long ago for "it".
-fn topic(talk: &Talk, now_ns: StampNs) -> Option<&Phrase> {
-    let newest = talk.ledger.entries().last().filter(|e| e.stands)?;
+/// Asks something of a sentence.
+fn put_question(
+    talk: &mut Talk,
+    u: &Utterance,
+    parse: &Parse,
+    (words, then, names): (String, [Then; 2], [Option<Name>; 2]),
+) -> Heard {
+    let (id, stamp_ns) = (u.id.clone(), u.began_ns);
+    talk.questions.ask(Question { id, stamp_ns, words: words.clone(), then, names });
+    asked(u, parse, words)
+}
+
+/// The newest sentence that stands, if it is not too long ago to be spoken of.
+fn newest(talk: &Talk, now_ns: StampNs) -> Option<&Entry> {
+    let newest = talk.ledger.entries().iter().rev().find(|e| e.stands)?;
     let since_ns = now_ns.saturating_sub(newest.stamp_ns);
-    (0..=TOPIC_NS).contains(&since_ns).then(|| language::topic(&newest.parse)).flatten()
+    (0..=TOPIC_NS).contains(&since_ns).then_some(newest)
 }
 
-/// Where a description was put, in words.
-fn put(filter: &Filter, utterance: u32, held: Vertex, here: &Here) -> String {
-    let poses = (here.poses)(filter.best());
-    let grounded = filter.best().labels.evidence().iter();
-    let grounded: Vec<_> =
-        grounded.filter(|e| e.utterance == utterance && e.source == Source::Grounded).collect();
-    let seen: f64 = grounded.iter().map(|e| e.weight).sum();
-    let likeliest = grounded.iter().max_by(|a, b| a.weight.total_cmp(&b.weight).then(b.place.cmp(&a.place)));
-    let Some(likeliest) = likeliest.filter(|_| seen > NOT_SEEN_MAX) else {
-        return " I think I have not seen it yet.".to_owned();
+/// What the newest sentence spoke of.
+fn topic(talk: &Talk, now_ns: StampNs) -> Option<&Phrase> {
+    language::topic(&newest(talk, now_ns)?.parse)
+}
+
+/// "No wait, the reading room": by itself it may say anything; just after a place was named it mends that.
+fn mended(text: &str, before: &Entry, now_ns: StampNs) -> Option<Analysis> {
+    let is_label = |act: &Act| matches!(act.content, Content::Label { .. });
+    let just_named =
+        before.parse.acts().iter().any(is_label) && now_ns.saturating_sub(before.stamp_ns) <= MENDED_NS;
+    let guess = language::guess(text).filter(|_| just_named)?;
+    let mends = |act: &Act| match &act.content {
+        Content::Correct { is, .. } => matches!(**is, Content::Label { .. }),
+        _ => false,
     };
-    let off = poses[held as usize].between(&poses[likeliest.place as usize]);
-    let (distance_m, bearing_rad) = (off.x_m.hypot(off.y_m), off.y_m.atan2(off.x_m));
-    if distance_m < HERE_M {
-        return " I think that is here.".to_owned();
-    }
-    let side = SIDES[((bearing_rad / FRAC_PI_4).round() as i32).rem_euclid(8) as usize];
-    format!(" I think that is some {distance_m:.0} m from here, {side}.")
+    guess.acts.iter().all(mends).then(|| Analysis { weight: guess.weight.max(MENDS), ..guess })
 }
 
-fn words(talk: &Talk, parse: &Parse) -> String {
-    language::words(parse.acts(), |name| talk.ledger.label(name.as_str()).is_some())
-}
-
-/// Where the best particle put an utterance, likeliest first.
-fn told(filter: &Filter, utterance: u32) -> Vec<(PlaceId, f64)> {
-    let mut sums: BTreeMap<Vertex, f64> = BTreeMap::new();
-    for e in filter.best().labels.evidence() {
-        if e.utterance == utterance && e.source != Source::Denied {
-            *sums.entry(e.place).or_insert(0.0) += e.weight;
-        }
-    }
-    let mut told: Vec<(PlaceId, f64)> =
-        sums.into_iter().map(|(v, p)| (PlaceId::from(v), p.min(1.0))).collect();
-    told.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
-    told.truncate(GROUNDED_TOLD);
-    told
-}
-
-/// What is told of an assertion that was understood, but of nothing that can be put anywhere.
-fn unplaced(parse: &Parse) -> &'static str {
-    let of = |content: &Content| match content {
-        Content::Label { what, .. } if what.label().is_none() => Some(" But I can keep no name of that."),
-        Content::Label { at: Phrase { head: Head::Any | Head::Visited | Head::Place, .. }, .. } => {
-            Some(WHICH)
-        }
-        Content::Same { what, like, .. } if !can_be_compared(what, like) => Some(WHICH),
-        Content::Locate(l) if l.figure.head == Head::It => {
-            Some(" But I don't know what you speak of: name it.")
-        }
-        _ => None,
-    };
-    parse.acts().iter().find_map(|act| of(&act.content)).unwrap_or_default()
-}
-
-/// Whether two places said to be one, or not, can be told: one is pointed to, and the other too, or it has a name.
-fn can_be_compared(what: &Phrase, like: &Phrase) -> bool {
-    let pointed = |p: &Phrase| matches!(p.head, Head::Here | Head::It | Head::Previous | Head::Start);
-    let known = |p: &Phrase| pointed(p) || p.head == Head::Visited || p.label().is_some();
-    pointed(what) && known(like) || pointed(like) && known(what)
-}
-
-fn heard(u: &Utterance, status: HeardStatus, parse: &Parse, words: String) -> Heard {
-    Heard {
-        id: u.id.clone(),
-        stamp_ns: u.began_ns,
-        text: u.text.clone(),
-        status,
-        parse: parse.notation().to_owned(),
-        grounded: Vec::new(),
-        words,
-    }
+fn did_you_mean(guess: &Analysis) -> String {
+    let asks = matches!(guess.acts.last(), Some(Act { content: Content::Ask { .. }, .. }));
+    let verb = if asks { "Did you ask" } else { "Did you mean that" };
+    format!("I am not sure. {verb} {}?", language::statement(&guess.acts))
 }

@@ -3,16 +3,21 @@
 //! ```text
 //! sentence ─ listen ─▶ language ─▶ take_in ─▶ ledger, claims, labels
 //!                                  describe ─▶ labels: grounded when said, and again as the map grows
+//!            └ doubts ─▶ questions ─▶ "yes": taken in
 //! "no, …", undo ─ mend ─▶ the same taken back
 //! ledger, claims, one particle's map ─ fold ─▶ p(λ | G)
 //! ```
 
+mod accept;
 pub mod claims;
 mod describe;
+mod doubts;
 mod fold;
 pub mod ledger;
 mod listen;
 mod mend;
+pub mod questions;
+mod replied;
 mod take_in;
 
 use crate::edge::Vertex;
@@ -23,8 +28,10 @@ use crate::filter::particle::Particle;
 use crate::filter::words::Words;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
+use crate::language::Content;
 use claims::Testimonies;
 use ledger::Ledger;
+use questions::Questions;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 
@@ -49,6 +56,8 @@ pub struct Talk {
     pub ledger: Arc<Ledger>,
     /// What of it is likelier in some graphs than in others.
     pub testimonies: Testimonies,
+    /// What guides were asked and did not answer yet.
+    pub questions: Questions,
 }
 
 impl Words for Talk {
@@ -58,8 +67,9 @@ impl Words for Talk {
 }
 
 impl Talk {
-    /// Takes a sentence: parses it, weighs every particle by it and updates its labels.
-    pub fn hear(&mut self, filter: &mut Filter, u: &Utterance, here: &Here) -> Heard {
+    /// Takes a sentence: parses it, weighs every particle by it and updates its labels. With it come the questions
+    /// in it, to be answered from the map.
+    pub fn hear(&mut self, filter: &mut Filter, u: &Utterance, here: &Here) -> (Heard, Vec<Content>) {
         listen::hear(self, filter, u, here)
     }
 

@@ -160,5 +160,6 @@ pub fn say(id: &str, text: &str, began_ns: i64) -> Utterance {
         began_ns,
         ended_ns: began_ns,
         retracts: None,
+        answers: None,
     }
 }

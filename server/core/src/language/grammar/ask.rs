@@ -358,12 +358,15 @@ fn located(figure: &Phrase, chain: &Chain) -> Option<Content> {
     related.first().map(|first| super::build::locate(figure, first))
 }
 
-/// The name in a question for a place: what a query asks for.
-pub(crate) fn asked_name(content: &Content) -> Option<Name> {
-    match content {
-        Content::Ask { kind: Question::Where | Question::Route, about: About::Phrase(phrase) } => {
-            phrase.label()
-        }
+/// The name in a question for a place, its way or whether there is one: what a query asks for.
+pub fn asked_name(content: &Content) -> Option<Name> {
+    let Content::Ask { kind, about } = content else { return None };
+    match (kind, about) {
+        (Question::Where | Question::Route | Question::HowFar, About::Phrase(phrase)) => phrase.label(),
+        (Question::Whether, About::Content(content)) => match &**content {
+            Content::Locate(l) if l.landmarks.iter().all(|p| p.head == Head::Here) => l.figure.label(),
+            _ => None,
+        },
         _ => None,
     }
 }

@@ -3,6 +3,7 @@
 
 use crate::language::act::{Content, Head, Phrase};
 use crate::language::grammar::build::Readings;
+use crate::language::lexicon::edits::edits;
 use crate::language::lexicon::names::Name;
 use crate::language::lexicon::places;
 use crate::language::relation::Relation as R;
@@ -56,19 +57,4 @@ pub(crate) fn guessed(readings: Readings) -> Option<Readings> {
         }
     }
     Some(Readings { all, certainty: readings.certainty })
-}
-
-/// Levenshtein's distance in bytes.
-fn edits(a: &str, b: &str) -> usize {
-    let mut row: Vec<usize> = (0..=b.len()).collect();
-    for (i, x) in a.bytes().enumerate() {
-        let mut diagonal = row[0];
-        row[0] = i + 1;
-        for (j, y) in b.bytes().enumerate() {
-            let substituted = diagonal + usize::from(x != y);
-            diagonal = row[j + 1];
-            row[j + 1] = substituted.min(row[j] + 1).min(diagonal + 1);
-        }
-    }
-    row[b.len()]
 }

@@ -2,6 +2,7 @@
 //! ("the mural") and nothing speaks against it: the vocabulary stays open.
 
 pub(crate) mod concepts;
+pub(crate) mod edits;
 pub(crate) mod names;
 pub(crate) mod normalise;
 pub(crate) mod numbers;
@@ -33,6 +34,12 @@ fn names_place(name: &str) -> bool {
 /// All known places of one word.
 pub(crate) fn places() -> impl Iterator<Item = &'static str> {
     let concepts = CONCEPTS.iter().map(|(lemma, ..)| *lemma).filter(|l| names_place(l) && !l.contains(' '));
+    concepts.chain(PLACES.iter().copied())
+}
+
+/// All names of places that everybody knows, in their canonical spelling.
+pub fn place_names() -> impl Iterator<Item = &'static str> {
+    let concepts = CONCEPTS.iter().map(|(lemma, ..)| *lemma).filter(|l| names_place(l));
     concepts.chain(PLACES.iter().copied())
 }
 

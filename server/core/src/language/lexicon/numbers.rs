@@ -17,7 +17,7 @@ const TEENS: [&str; 10] = [
 const TENS: [&str; 8] = ["twenty", "thirty", "forty", "fifty", "sixty", "seventy", "eighty", "ninety"];
 
 /// Is it a number in digits or a number word?
-pub(crate) fn is_number(word: &str) -> bool {
+pub fn is_number(word: &str) -> bool {
     digits_of(word).is_some() || matches!(word, "hundred" | "oh")
 }
 

@@ -22,7 +22,7 @@ mod of_groups;
 pub mod of_kinds;
 pub mod propose;
 pub mod read;
-mod sound;
+pub(crate) mod sound;
 #[cfg(test)]
 mod tests;
 pub mod tokens;
