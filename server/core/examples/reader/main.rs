@@ -21,6 +21,8 @@ use train::train;
 /// Each of our templates is filled so often, and counts for so much of a sentence that somebody said.
 const MADE_TIMES: usize = 3;
 const MADE_WEIGHT: f32 = 0.3;
+/// What other people said counts for so many of ours.
+const THEIRS: f32 = 3.0;
 /// More acts in one sentence are not learned from.
 const ACTS: usize = 4;
 
@@ -56,7 +58,8 @@ fn load(path: &str) -> Vec<Sentence> {
             let string = |v: &serde_json::Value| v.as_str().unwrap_or_default().to_owned();
             let also = v["also"].as_array().into_iter().flatten().map(string);
             let kind = v["kind"].as_str().unwrap_or("all");
-            sentence(&string(&v["text"]), kind, std::iter::once(string(&v["parse"])).chain(also).collect())
+            let all = std::iter::once(string(&v["parse"])).chain(also).collect();
+            Sentence { weight: THEIRS, ..sentence(&string(&v["text"]), kind, all) }
         })
         .collect()
 }

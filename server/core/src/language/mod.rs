@@ -18,6 +18,7 @@
 //! (spatial clauses of route texts, [`clauses`]), `vocabulary FILE` (place words that the lexicon covers).
 
 pub mod act;
+mod agreement;
 pub(crate) mod clauses;
 mod ellipsis;
 pub(crate) mod grammar;

@@ -3,28 +3,30 @@
 //! A sentence that the grammar reads whole says what it reads, unless the reader is sure of something else. Others
 //! say what the reader makes of them if that is likely enough: half understood is not understood.
 
-use crate::language::act::{Act, Analysis, Content, Head, Parse, Phrase};
+use crate::language::act::{About, Act, Analysis, Content, Head, Parse, Phrase, Reason};
+use crate::language::agreement::{agree, says_all};
 use crate::language::grammar::ask::asked_name;
 use crate::language::grammar::cursor::Cursor;
 use crate::language::grammar::parse;
 use crate::language::grammar::sentence::{FILLERS, TAGS};
-use crate::language::lexicon::names::{Kind, Name};
+use crate::language::lexicon::names::Name;
 use crate::language::lexicon::normalise::{MAX_TEXT_BYTES, sentences};
 use crate::language::notation::notation;
 use crate::language::reader::judge::Judge;
-use crate::language::reader::read::{agree, analyses};
+use crate::language::reader::lexicon::{Class, lexicon};
+use crate::language::reader::read::analyses;
 use crate::language::reader::tokens::tokens;
 
 /// Analyses of a text that are kept.
 const ANALYSES_MAX: usize = 8;
-/// What the reader makes of a text is heard from so likely on: likelier than not.
-pub const HEARD: f64 = 0.5;
+/// What the reader makes of a text is heard from so likely on; what is less likely is asked.
+pub const HEARD: f64 = 0.55;
 /// From so likely on it is worth asking whether that was meant.
 const ASKED: f64 = 0.25;
-/// What names something that the lexicon takes for no place is believed from so likely on.
+/// What names a person, a time or an event is believed from so likely on.
 const ODD: f64 = 0.9;
-/// So likely, another reading than the grammar's is preferred.
-const OVERRULED: f64 = 0.6;
+/// What the grammar reads is heard if the reader holds it for no less likely.
+const AGREED: f64 = 0.2;
 
 /// What a text says; no analyses if it is not understood or longer than
 /// [`MAX_TEXT_BYTES`](super::MAX_TEXT_BYTES). Linear in the text.
@@ -42,19 +44,72 @@ pub fn parse_by(text: &str, judge: &Judge) -> Parse {
 }
 
 fn read_by(text: &str, judge: &Judge) -> Parse {
-    let exact = parse::parse(text);
+    let mut exact = parse::parse(text);
+    exact.analyses.iter_mut().for_each(it_is_here);
     if text.len() > MAX_TEXT_BYTES {
         return exact;
     }
     let read = analyses(text, judge);
     let Some(best) = read.first() else { return exact };
-    if let Some(first) = exact.best() {
-        // Silence overrules nothing: the judge is silent on names that it never met.
-        let says_else = !best.acts.is_empty() && !agree(&first.acts, &best.acts);
-        let overruled = best.weight > OVERRULED && says_else;
-        return if overruled { said(text, read) } else { exact };
+    let Some(first) = exact.best() else { return said(text, read) };
+    let agreed = read.iter().find(|a| agree(&first.acts, &a.acts)).map_or(0.0, |a| a.weight);
+    // Two that agree are seldom both wrong. Silence overrules nothing: the judge is silent on names that it never met.
+    if agreed >= AGREED || best.acts.is_empty() || is_known(&first.acts) {
+        return exact;
     }
-    said(text, read)
+    // Of one sentence it is believed that says more, or that speaks alone; of several the grammar says too much.
+    let is_one = text.trim_end().trim_end_matches(['.', '?', '!']).split(['.', '?', '!']).count() < 2;
+    if is_one && says_all(&first.acts, &best.acts) {
+        return exact;
+    }
+    // Where the reader is not sure of the whole, it may be of each part.
+    let likely = |act: &Act| {
+        let with = |a: &&Analysis| says_all(&a.acts, std::slice::from_ref(act));
+        read.iter().filter(with).map(|a| a.weight).sum::<f64>() >= AGREED
+    };
+    let stands = is_one && first.acts.len() == 1 || first.acts.iter().all(likely);
+    let heard = said(text, read);
+    if heard.analyses.is_empty() && stands { exact } else { heard }
+}
+
+/// "It is the gym", where nothing was spoken of before, is said of here.
+fn it_is_here(reading: &mut Analysis) {
+    fn of(content: &mut Content) {
+        match content {
+            Content::Label { at, .. } if at.head == Head::It => at.head = Head::Here,
+            Content::Negate(inner) => of(inner),
+            Content::Correct { was, is } => was.iter_mut().chain([is]).for_each(|content| of(content)),
+            _ => {}
+        }
+    }
+    if let Some(first) = reading.acts.first_mut() {
+        of(&mut first.content);
+        reading.notation = notation(&reading.acts);
+    }
+}
+
+/// What the judge knows nothing of: figures of speech, names that were misheard, distances and counts, where one
+/// started or was before, places told by where they are.
+fn is_known(acts: &[Act]) -> bool {
+    acts.iter().any(|act| is_only_read_exactly(&act.content))
+}
+
+fn is_only_read_exactly(content: &Content) -> bool {
+    let is_known = |p: &Phrase| matches!(p.head, Head::Start | Head::Visited) || !p.within.is_empty();
+    match content {
+        Content::Ignored(reason) => *reason == Reason::Idiom,
+        Content::Locate(l) => {
+            l.repaired || l.modifiers.distance.is_some() || l.modifiers.count.is_some() || is_known(&l.figure)
+        }
+        Content::Label { at: a, what: b, .. }
+        | Content::Alias { what: a, also: b }
+        | Content::Same { what: a, like: b, .. } => is_known(a) || is_known(b),
+        Content::Negate(inner) | Content::Ask { about: About::Content(inner), .. } => {
+            is_only_read_exactly(inner)
+        }
+        Content::Ask { about: About::Phrase(p), .. } => matches!(p.head, Head::Here | Head::There),
+        _ => false,
+    }
 }
 
 /// What is likely enough to be heard.
@@ -110,34 +165,35 @@ fn left_behind(reading: &mut Analysis) {
 fn foretells(text: &str) -> bool {
     let words = tokens(text);
     let is = |at: usize, word: &str| words.get(at).is_some_and(|t| t.text == word);
-    (0..words.len()).any(|at| is(at, "will") || is(at, "going") && is(at + 1, "to") && is(at + 2, "be"))
+    let be = |at: usize| is(at, "be") || is(at + 1, "be") && words[at].class == Class::Adv;
+    (0..words.len())
+        .any(|at| is(at, "will") && be(at + 1) || is(at, "going") && is(at + 1, "to") && be(at + 2))
 }
 
 fn is_of_here(content: &Content) -> bool {
     matches!(content, Content::Label { at, .. } if at.head == Head::Here)
 }
 
-/// Whether what is named is hardly a place: the lexicon knows of people, times and other things that are none.
+/// Whether what is named is hardly a place: a person, a time, an event, or nothing that tells it from others.
 fn is_odd(content: &Content) -> bool {
-    content.asserts() && !is_sensible(content)
+    let is_none = |phrase: &Phrase| phrase.full_name().is_some_and(|name| !may_be_a_place(&name));
+    match content {
+        Content::Label { what, .. } => is_none(what),
+        Content::Same { like, .. } => is_none(like),
+        Content::Locate(locate) => is_none(&locate.figure),
+        Content::Correct { is, .. } => is_odd(is),
+        _ => false,
+    }
 }
 
-fn is_sensible(content: &Content) -> bool {
-    let is_place = |phrase: &Phrase| match &phrase.head {
-        Head::Named(name) => matches!(name.kind(), Kind::Place | Kind::Open),
-        _ => true,
+fn may_be_a_place(name: &Name) -> bool {
+    let is_none = |word: &str| {
+        matches!(lexicon().class(word), Class::Person | Class::Time)
+            || lexicon()
+                .sense(word)
+                .is_some_and(|s| matches!(s, "person" | "time" | "event" | "animal" | "abstract"))
     };
-    let is_some = |phrase: &Phrase| phrase.full_name().is_none_or(|name| name.kind() != Kind::No);
-    match content {
-        Content::Label { what, .. } => is_place(what) && is_some(what),
-        Content::Same { like, .. } => is_place(like),
-        Content::Alias { what, also } => is_some(what) && is_some(also),
-        Content::Locate(locate) => is_some(&locate.figure),
-        Content::Attribute { what, .. } => is_place(what),
-        Content::Correct { is, .. } => is_sensible(is),
-        Content::Route { then: Some(then), .. } => is_sensible(then),
-        _ => true,
-    }
+    !name.is_vague() && !name.head().is_some_and(is_none)
 }
 
 /// What is said, over all hearings of a recogniser: the text and its alternatives, each with its

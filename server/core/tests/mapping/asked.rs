@@ -1,4 +1,4 @@
-//! What a guide is asked, what is answered, and what several sentences say together.
+//! What a guide is asked, what is answered, and what boredal sentences say together.
 
 use crate::tour::{SECOND_NS, Tour};
 use crate::where_is;
@@ -7,30 +7,29 @@ use toponym_core::effects::HeardStatus;
 
 #[test]
 fn a_name_that_sounds_like_another_is_asked_about() {
-    for (reply, server, sever) in
-        [("yes", true, false), ("no", false, true), ("the server room", true, false)]
+    for (reply, board, bored) in [("yes", true, false), ("no", false, true), ("the board room", true, false)]
     {
         let mut tour = Tour::begin();
-        let asked = tour.say("this is the sever room");
+        let asked = tour.say("this is the bored room");
         assert_eq!(asked.status, HeardStatus::Asked, "{asked:?}");
-        assert!(asked.question.as_ref().unwrap().contains("Did you mean the server room?"), "{asked:?}");
+        assert!(asked.question.as_ref().unwrap().contains("Did you mean the board room?"), "{asked:?}");
         // Until then it is taken in as what it may be.
-        assert!((tour.p("server room") - 0.6).abs() < 0.2 && (tour.p("sever room") - 0.2).abs() < 0.15);
+        assert!((tour.p("board room") - 0.6).abs() < 0.2 && (tour.p("bored room") - 0.2).abs() < 0.15);
         let answered = tour.answer(&asked, reply);
         assert_eq!(answered.status, HeardStatus::Understood, "{answered:?}");
-        assert_eq!((tour.p("server room") > 0.8, tour.p("sever room") > 0.8), (server, sever), "{reply}");
-        assert_eq!((tour.p("server room") < 0.1, tour.p("sever room") < 0.1), (sever, server), "{reply}");
+        assert_eq!((tour.p("board room") > 0.8, tour.p("bored room") > 0.8), (board, bored), "{reply}");
+        assert_eq!((tour.p("board room") < 0.1, tour.p("bored room") < 0.1), (bored, board), "{reply}");
     }
 }
 
 #[test]
 fn what_is_known_here_is_not_asked_about_again() {
     let mut tour = Tour::begin();
-    let asked = tour.say("this is the sever room");
+    let asked = tour.say("this is the bored room");
     tour.say("no");
-    assert_eq!(tour.say("this is the sever room").status, HeardStatus::Understood);
+    assert_eq!(tour.say("this is the bored room").status, HeardStatus::Understood);
     // The same sentence again asks no second time.
-    let again = tour.send(say(&asked.id, "this is the sever room", tour.now_ns));
+    let again = tour.send(say(&asked.id, "this is the bored room", tour.now_ns));
     assert_eq!(again.status, HeardStatus::Understood, "{again:?}");
 }
 
@@ -69,7 +68,7 @@ fn undo_takes_back_what_was_just_said_and_asks_if_that_is_long_ago() {
 fn a_yes_to_nothing_changes_nothing() {
     let mut tour = Tour::begin();
     assert_eq!(tour.say("yes").status, HeardStatus::NotUnderstood);
-    let asked = tour.say("this is the sever room");
+    let asked = tour.say("this is the bored room");
     tour.now_ns += 120 * SECOND_NS;
     assert_eq!(tour.say("yes").status, HeardStatus::NotUnderstood, "too late without an id");
     assert_eq!(tour.answer(&asked, "yes").status, HeardStatus::Understood);

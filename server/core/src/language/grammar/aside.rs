@@ -5,7 +5,7 @@ use crate::language::grammar::cursor::Cursor;
 use crate::language::lexicon::normalise::Word;
 
 /// Figures of speech that sound like places.
-const IDIOMS: &str = "in the dumps|the point of no return|over the moon|on top of the world|under the weather|on the same page|\
+const IDIOMS: &str = "welcome to the jungle|welcome to the real world|in the dumps|the point of no return|over the moon|on top of the world|under the weather|on the same page|\
     through the roof|around the bend|round the bend|out of the woods|behind the times|down the drain|across the board|\
     in hot water|up in the air|on the fence|a rock and a hard place|in the same boat|down to earth|on cloud nine|\
     in the loop|out of the loop|under the table|around the clock|on thin ice|up the creek|the end of my rope|\

@@ -110,7 +110,8 @@ pub(crate) fn is_function_word(word: &str) -> bool {
     listed(FUNCTION_WORDS, word) || is_adverb(word)
 }
 
-fn is_adverb(word: &str) -> bool {
+/// Does this word look like an adverb in -ly?
+pub(crate) fn is_adverb(word: &str) -> bool {
     word.len() > 4 && word.ends_with("ly") && !listed(LY_NOUNS, word)
 }
 

@@ -1,5 +1,6 @@
 //! Names of places: one spelling for all that people say and write for the same.
 
+use crate::language::lexicon::concepts::Type;
 use crate::language::lexicon::normalise::{COMMA, name_words};
 use crate::language::lexicon::numbers::{is_number, numbers_as_spoken};
 use crate::language::lexicon::{
@@ -98,6 +99,17 @@ impl Name {
         if odd { Kind::No } else { Kind::Open }
     }
 
+    /// Whether nothing tells what it names from others, or that it is none: "large room", "the wrong room".
+    pub(crate) fn is_vague(&self) -> bool {
+        self.0.split(' ').any(is_disqualified) || self.kind() == Kind::Vague
+    }
+
+    /// Its head noun.
+    pub(crate) fn head(&self) -> Option<&str> {
+        let words: Vec<&str> = self.0.split(' ').collect();
+        head(&words).map(|at| words[at])
+    }
+
     /// The name with its article, as one says it: "the gym", "lecture hall five", "nick's office".
     pub fn with_article(&self) -> String {
         let first = self.0.split(' ').next().unwrap_or_default();
@@ -151,7 +163,32 @@ fn canonical(words: &[&str]) -> Vec<String> {
         at += 1 + usize::from(pair.is_some());
     }
     plain_hall_is_hallway(&mut words);
-    numbers_as_spoken(&words)
+    if let [only] = &words[..]
+        && matches!(only.as_str(), "men's" | "women's" | "gent")
+    {
+        let whose = if only == "women's" { "women's" } else { "men's" };
+        words = vec![whose.to_owned(), "room".to_owned()];
+    }
+    numbers_as_spoken(&of_last(words))
+}
+
+/// "Lab of biology" is the biology lab, "room of number three" room three.
+fn of_last(mut words: Vec<String>) -> Vec<String> {
+    let Some(at) = words.iter().position(|w| w == "of") else { return words };
+    let is_room = at > 0 && words[at - 1] != "hall" && concept(&words[at - 1]) == Some(Type::Room);
+    let once = words.iter().filter(|w| *w == "of").count() == 1 && at + 1 < words.len();
+    if !is_room || !once {
+        return words;
+    }
+    let mut told = words.split_off(at);
+    told.remove(0);
+    told.retain(|w| w != "number");
+    if told.iter().all(|w| is_number(w)) {
+        words.extend(told);
+        return words;
+    }
+    told.extend(words);
+    told
 }
 
 /// "Hall" by itself is a hallway; in "lecture hall" it is not.
@@ -213,6 +250,9 @@ mod tests {
             ("mailroom", "the mail room"),
             ("the beautiful lobby", "lobby"),
             ("gate A", "the gate a"),
+            ("laboratory of biology", "the biology lab"),
+            ("meeting room of number three", "meeting room 3"),
+            ("the gents", "the men's room"),
         ] {
             assert_eq!(name(a), name(b));
             assert!(!name(a).is_empty());

@@ -53,7 +53,7 @@ fn split(text: &str) -> Vec<Sentence> {
     while at < chars.len() {
         let c = chars[at];
         let next = chars.get(at + 1).copied();
-        if c.is_alphanumeric() {
+        if is_of_word(c) {
             let end = word_end(&chars, at);
             now.words.push(Word { text: chars[at..end].iter().collect(), capital: upper[at] });
             at = end;
@@ -73,6 +73,14 @@ fn split(text: &str) -> Vec<Sentence> {
     done
 }
 
+/// Whether a character is one of a word: letters, digits, and the marks that some scripts set on letters.
+pub(crate) fn is_of_word(c: char) -> bool {
+    let is_mark = matches!(c, '\u{300}'..='\u{36f}' | '\u{591}'..='\u{5c7}' | '\u{610}'..='\u{61a}' | '\u{64b}'..='\u{65f}'
+        | '\u{900}'..='\u{903}' | '\u{93a}'..='\u{94f}' | '\u{e31}' | '\u{e34}'..='\u{e3a}' | '\u{e47}'..='\u{e4e}'
+        | '\u{200c}' | '\u{200d}');
+    c.is_alphanumeric() || is_mark
+}
+
 /// One past the last character of the word that begins at `at`: letters or digits, one kind at a
 /// time but for ordinals ("2nd"), with apostrophes inside.
 fn word_end(chars: &[char], at: usize) -> usize {
@@ -85,7 +93,7 @@ fn word_end(chars: &[char], at: usize) -> usize {
     let mut end = at;
     while let Some(&c) = chars.get(end) {
         let inside = c == '\'' && chars.get(end + 1).is_some_and(|n| n.is_alphabetic());
-        if c.is_ascii_digit() || !(c.is_alphanumeric() || inside) {
+        if c.is_ascii_digit() || !(is_of_word(c) || inside) {
             break;
         }
         end += 1;

@@ -279,8 +279,9 @@ pub(crate) const KEEP_S: &[&str] = &[
 ];
 /// Words in -ly that are no adverbs.
 pub(crate) const LY_NOUNS: &[&str] = &[
-    "assembly", "butterfly", "daily", "family", "fly", "friendly", "homely", "italy", "july", "lily",
-    "monopoly", "supply", "weekly",
+    "anomaly", "assembly", "belly", "billy", "bully", "butterfly", "curly", "daily", "dolly", "elderly", "emily",
+    "family", "fly", "friendly", "gully", "hilly", "holly", "homely", "italy", "jelly", "july", "kelly", "lily",
+    "lolly", "lovely", "molly", "monopoly", "polly", "rally", "reply", "sally", "silly", "supply", "ugly", "weekly",
 ];
 /// Adjectives that describe a place without naming it.
 pub(crate) const QUALITIES: &[&str] = &[

@@ -11,8 +11,8 @@ pub type Row = [f32; KINDS];
 const LEARNED: &[u8] = include_bytes!("../../../lexicon/english/judge.bin");
 /// One step of a weight.
 const UNIT: f32 = 1.0 / 32.0;
-/// Smaller weights, in steps, are left out, for size: three steps cost two sentences in a hundred.
-const LEAST: i8 = 2;
+/// Smaller weights, in steps, are left out, for size: of kinds and of groups.
+const LEAST: [i8; 2] = [3, 2];
 const BUCKET_BITS: u32 = 16;
 
 /// Values by feature, sorted.
@@ -98,7 +98,7 @@ impl Judge {
         let mut out: Vec<u8> = Vec::new();
         let mut kinds: Vec<(Feature, Vec<u8>)> = Vec::new();
         for (feature, row) in &weights.kinds {
-            let kept = row.iter().map(|w| steps(*w)).enumerate().filter(|(_, w)| w.abs() >= LEAST);
+            let kept = row.iter().map(|w| steps(*w)).enumerate().filter(|(_, w)| w.abs() >= LEAST[0]);
             let kept: Vec<u8> = kept.flat_map(|(k, w)| [k as u8, w as u8]).collect();
             if !kept.is_empty() {
                 kinds.push((*feature, kept));
@@ -114,7 +114,7 @@ impl Judge {
             out.extend(kept);
         }
         let mut groups: Vec<(Feature, i8)> =
-            weights.groups.iter().map(|&(f, w)| (f, steps(w))).filter(|(_, w)| w.abs() >= LEAST).collect();
+            weights.groups.iter().map(|&(f, w)| (f, steps(w))).filter(|(_, w)| w.abs() >= LEAST[1]).collect();
         groups.sort_unstable();
         push(groups.len() as u32, &mut out);
         let mut before = 0;

@@ -1,6 +1,7 @@
 //! Words as data: what `server/core/lexicon` says of them.
 
 use crate::language::act::Head;
+use crate::language::lexicon::is_adverb;
 use crate::language::reader::forms::{expanded, inflected};
 use crate::language::reader::sound::sound;
 use crate::language::relation::Relation;
@@ -310,7 +311,7 @@ impl Lexicon {
         }
         match word.bytes().next() {
             Some(b) if b.is_ascii_digit() => Class::Num,
-            _ if word.len() > 4 && word.ends_with("ly") => Class::Adv,
+            _ if is_adverb(word) => Class::Adv,
             _ => Class::Open,
         }
     }

@@ -64,15 +64,3 @@ fn of_whole(text: &str, judge: &Judge) -> Vec<Analysis> {
 fn analysis(weight: f64, acts: Vec<Act>) -> Analysis {
     Analysis { weight, notation: notation(&acts), acts, hearing: 0 }
 }
-
-/// Whether what is read is no more than what the grammar has, each act of a kind that it has, too.
-pub fn agree(exact: &[Act], read: &[Act]) -> bool {
-    // What mends says what it is mended to.
-    let kind = |act: &Act| match &act.content {
-        Content::Correct { is, .. } => std::mem::discriminant::<Content>(is),
-        content => std::mem::discriminant::<Content>(content),
-    };
-    !read.is_empty()
-        && read.len() <= exact.len()
-        && read.iter().all(|r| exact.iter().any(|e| kind(e) == kind(r)))
-}

@@ -86,14 +86,14 @@ proptest! {
             kinds: kinds.iter().map(|(f, w)| (*f, row(*w))).collect(),
             groups: groups.iter().map(|(f, w)| (*f, weight(*w))).collect(),
         }));
-        let kept = |w: i8| if w.abs() < 2 { 0.0 } else { weight(w) };
+        let kept = |w: i8, least: i8| if w.abs() < least { 0.0 } else { weight(w) };
         for (f, w) in &groups {
-            prop_assert!((judge.weight(*f) - kept(*w)).abs() < 1e-6);
+            prop_assert!((judge.weight(*f) - kept(*w, 2)).abs() < 1e-6);
         }
         for (f, w) in &kinds {
             let mut sums = [0.0; KINDS];
             judge.add(*f, &mut sums);
-            prop_assert!((sums[3] - kept(*w)).abs() < 1e-6);
+            prop_assert!((sums[3] - kept(*w, 3)).abs() < 1e-6);
         }
     }
 

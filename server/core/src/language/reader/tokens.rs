@@ -1,5 +1,6 @@
 //! A text as words with classes, contractions taken apart.
 
+use crate::language::lexicon::normalise::is_of_word;
 use crate::language::reader::lexicon::{Class, lexicon};
 
 /// A word, or what stands between words.
@@ -27,7 +28,7 @@ pub fn tokens(text: &str) -> Vec<Token> {
     while at < chars.len() {
         let c = chars[at];
         let next = chars.get(at + 1).copied().unwrap_or(' ');
-        if c.is_alphanumeric() {
+        if is_of_word(c) {
             let end = word_end(&chars, at);
             let word: String = chars[at..end].iter().collect();
             words.push((word, c.is_uppercase() && mixed));
@@ -76,7 +77,7 @@ fn word_end(chars: &[char], at: usize) -> usize {
     while let Some(&c) = chars.get(end) {
         let inside =
             matches!(c, '\'' | '/' | '&' | '.') && chars.get(end + 1).is_some_and(|n| n.is_alphanumeric());
-        if !(c.is_alphanumeric() || inside) {
+        if !(is_of_word(c) || inside) {
             break;
         }
         end += 1;
