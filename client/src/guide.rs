@@ -1,10 +1,16 @@
 //! The guide's role: says what places are called and hears what became of it.
+//!
+//! A sentence is said again, under its id, until the server has told what became of it: it survives cuts of the
+//! network and restarts of the server, and counts once.
 
 use crate::session::ClientError;
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, Sender, channel, error::RecvError};
-use tokio::time::{Instant, timeout_at};
-use toponym_proto::answer::{Heard, HeardStatus};
+use tokio::task::JoinHandle;
+use tokio::time::{Instant, interval, timeout_at};
+use toponym_proto::answer::{ErrorCode, Heard, HeardStatus};
 use toponym_proto::codec::ENCODING_JSON;
 use toponym_proto::{Keys, Limits, Message, Refused, Say};
 use tracing::warn;
@@ -14,6 +20,14 @@ use zenoh::qos::CongestionControl;
 
 /// Feedback kept for a slow listener; the oldest goes first.
 const FEEDBACK: usize = 1024;
+/// Sentences kept until it is known what became of them; the oldest goes first.
+const UNHEARD_MAX: usize = 10_000;
+/// A sentence of which nothing is heard is said again after this, the next time after twice as long …
+const AGAIN: Duration = Duration::from_secs(1);
+/// … but no longer than this.
+const AGAIN_MAX: Duration = Duration::from_secs(8);
+/// How often it is looked what is to be said again.
+const LOOK: Duration = Duration::from_millis(200);
 
 /// Talks to one robot, or to the only one there is.
 #[derive(Debug)]
@@ -24,7 +38,77 @@ pub struct Guide {
     /// Who says it, told with every sentence.
     pub speaker: Option<String>,
     feedback: Sender<Heard>,
+    unheard: Arc<Mutex<Unheard>>,
+    repeater: JoinHandle<()>,
     _subscriber: Subscriber<()>,
+}
+
+impl Drop for Guide {
+    fn drop(&mut self) {
+        self.repeater.abort();
+    }
+}
+
+/// Sentences of which it is not known yet what became of them, in the order in which they were said.
+#[derive(Debug, Default)]
+struct Unheard {
+    sentences: VecDeque<Sentence>,
+}
+
+#[derive(Debug)]
+struct Sentence {
+    id: String,
+    key: String,
+    json: Vec<u8>,
+    again_at: Instant,
+    wait: Duration,
+}
+
+impl Unheard {
+    fn add(&mut self, id: &str, key: String, json: Vec<u8>) {
+        if self.sentences.len() >= UNHEARD_MAX
+            && let Some(oldest) = self.sentences.pop_front()
+        {
+            warn!(id = oldest.id, "given up: the server tells nothing of too many sentences");
+        }
+        let again_at = Instant::now() + AGAIN;
+        self.sentences.push_back(Sentence { id: id.into(), key, json, again_at, wait: AGAIN });
+    }
+
+    /// What became of a sentence is known, unless it only waits for its turn.
+    fn hear(&mut self, heard: &Heard) {
+        if is_final(heard) {
+            self.sentences.retain(|s| s.id != heard.id);
+        }
+    }
+
+    /// What is to be said again at `now`: all that is waited for, so that the order is kept, once the oldest is due.
+    fn due(&mut self, now: Instant) -> Vec<(String, Vec<u8>)> {
+        if self.sentences.front().is_none_or(|oldest| oldest.again_at > now) {
+            return Vec::new();
+        }
+        let again = |sentence: &mut Sentence| {
+            sentence.wait = (2 * sentence.wait).min(AGAIN_MAX);
+            sentence.again_at = now + sentence.wait;
+            (sentence.key.clone(), sentence.json.clone())
+        };
+        self.sentences.iter_mut().map(again).collect()
+    }
+}
+
+/// Whether nothing more becomes of a sentence: it is in the map, or can't be.
+pub fn is_final(heard: &Heard) -> bool {
+    match (&heard.status, &heard.error) {
+        (HeardStatus::Read, _) => false,
+        (HeardStatus::Refused, Some(problem)) => {
+            !matches!(problem.code, ErrorCode::Busy | ErrorCode::Internal)
+        }
+        _ => true,
+    }
+}
+
+fn lock(unheard: &Mutex<Unheard>) -> MutexGuard<'_, Unheard> {
+    unheard.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl Guide {
@@ -35,12 +119,16 @@ impl Guide {
     pub async fn connect(session: &Session, site: &str, robot: Option<&str>) -> Result<Self, ClientError> {
         let keys = Keys::new(site)?;
         let (feedback, _) = channel(FEEDBACK);
-        let sender = feedback.clone();
+        let unheard = Arc::new(Mutex::new(Unheard::default()));
+        let (sender, known) = (feedback.clone(), unheard.clone());
         let subscriber = session
             .declare_subscriber(keys.heard(robot.unwrap_or("*")))
             .callback(move |sample| match serde_json::from_slice(&sample.payload().to_bytes()) {
-                // Nobody listening is no error.
-                Ok(heard) => drop(sender.send(heard)),
+                Ok(heard) => {
+                    lock(&known).hear(&heard);
+                    // Nobody listening is no error.
+                    let _ = sender.send(heard);
+                }
                 Err(e) => warn!(key = sample.key_expr().as_str(), "unreadable feedback: {e}"),
             })
             .await?;
@@ -50,6 +138,8 @@ impl Guide {
             robot: robot.map(Into::into),
             speaker: None,
             feedback,
+            repeater: tokio::spawn(repeat(session.clone(), unheard.clone())),
+            unheard,
             _subscriber: subscriber,
         })
     }
@@ -89,47 +179,130 @@ impl Guide {
     pub async fn send(&self, say: &Say, timeout: Duration) -> Result<Heard, ClientError> {
         let (mut feedback, deadline) = (self.feedback(), Instant::now() + timeout);
         self.publish(say).await?;
+        let mut last: Option<Heard> = None;
         loop {
             match timeout_at(deadline, feedback.recv()).await {
-                Ok(Ok(Heard { id, error: Some(error), status: HeardStatus::Refused, .. }))
-                    if id == say.id =>
-                {
-                    return Err(ClientError::Refused(error));
+                Ok(Ok(heard)) if heard.id == say.id && is_final(&heard) => {
+                    return match heard {
+                        Heard { status: HeardStatus::Refused, error: Some(error), .. } => {
+                            Err(ClientError::Refused(error))
+                        }
+                        heard => Ok(heard),
+                    };
                 }
-                Ok(Ok(heard)) if heard.id == say.id => return Ok(heard),
+                Ok(Ok(heard)) if heard.id == say.id => last = Some(heard),
                 Ok(Ok(_) | Err(RecvError::Lagged(_))) => {}
                 // The sender lives as long as this guide, so it can only be late.
-                Ok(Err(RecvError::Closed)) | Err(_) => {
-                    return Err(ClientError::Timeout {
-                        what: format!("feedback to {:?}", say.text),
-                        after: timeout,
-                    });
-                }
+                Ok(Err(RecvError::Closed)) | Err(_) => return Err(not_yet(&say.text, timeout, last)),
             }
         }
     }
 
-    /// Publishes a sentence without waiting; its feedback comes by [`Guide::feedback`].
+    /// Publishes a sentence without waiting; its feedback comes by [`Guide::feedback`], and until then it is said
+    /// again.
     ///
     /// # Errors
-    /// If the protocol refuses it; Zenoh's own.
+    /// If the protocol refuses it.
     pub async fn publish(&self, say: &Say) -> Result<(), ClientError> {
         let message = Message::Say(say.clone());
         message.validate(&Limits::default())?;
         let json = message
             .to_json()
             .map_err(|e: Refused| ClientError::Unreadable { key: "say".into(), why: e.to_string() })?;
-        self.session
-            .put(self.keys.say(say.robot.as_deref().or(self.robot.as_deref())), json)
-            .encoding(ENCODING_JSON)
-            .congestion_control(CongestionControl::Block)
-            .express(true)
-            .await?;
+        let key = self.keys.say(say.robot.as_deref().or(self.robot.as_deref()));
+        lock(&self.unheard).add(&say.id, key.clone(), json.clone());
+        put(&self.session, &key, json).await;
         Ok(())
+    }
+
+    /// Sentences of which it is not known yet what became of them.
+    pub fn unheard(&self) -> usize {
+        lock(&self.unheard).sentences.len()
     }
 
     /// All feedback from now on, to this guide's sentences and to others'.
     pub fn feedback(&self) -> Receiver<Heard> {
         self.feedback.subscribe()
+    }
+}
+
+/// Why there is no answer yet, with what is known.
+fn not_yet(text: &str, after: Duration, last: Option<Heard>) -> ClientError {
+    let what = match last {
+        None => format!("feedback to {text:?}: it is not known whether it arrived"),
+        Some(Heard { status: HeardStatus::Read, .. }) => {
+            format!(
+                "what becomes of {text:?}: the server has it on disk, and takes it in when its turn comes"
+            )
+        }
+        Some(Heard { error: Some(error), .. }) => return ClientError::Refused(error),
+        Some(heard) => format!("what becomes of {text:?}: {}", heard.words),
+    };
+    ClientError::Timeout { what, after }
+}
+
+/// Says again what nothing is heard of.
+async fn repeat(session: Session, unheard: Arc<Mutex<Unheard>>) {
+    let mut look = interval(LOOK);
+    loop {
+        look.tick().await;
+        let due = lock(&unheard).due(Instant::now());
+        for (key, json) in due {
+            put(&session, &key, json).await;
+        }
+    }
+}
+
+async fn put(session: &Session, key: &str, json: Vec<u8>) {
+    let put = session.put(key, json).encoding(ENCODING_JSON);
+    if let Err(e) = put.congestion_control(CongestionControl::Block).express(true).await {
+        // It is said again.
+        warn!(key, "could not be sent now: {e}");
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn heard(id: &str, status: HeardStatus) -> Heard {
+        Heard {
+            id: id.into(),
+            status,
+            durable: true,
+            parse: String::new(),
+            grounded: Vec::new(),
+            words: String::new(),
+            question: None,
+            error: None,
+        }
+    }
+
+    #[test]
+    fn what_is_not_heard_is_said_again_in_order() {
+        let (mut unheard, now) = (Unheard::default(), Instant::now());
+        for id in ["a", "b", "c"] {
+            unheard.add(id, id.into(), Vec::new());
+        }
+        let keys = |due: Vec<(String, Vec<u8>)>| due.into_iter().map(|(key, _)| key).collect::<String>();
+        assert_eq!(keys(unheard.due(now)), "");
+        unheard.hear(&heard("b", HeardStatus::NotUnderstood));
+        unheard.hear(&heard("a", HeardStatus::Read));
+        assert_eq!(keys(unheard.due(now + 2 * AGAIN)), "ac");
+        assert_eq!(keys(unheard.due(now + 3 * AGAIN)), "", "twice as long after that");
+        assert_eq!(keys(unheard.due(now + 100 * AGAIN)), "ac");
+        unheard.hear(&heard("a", HeardStatus::Asked));
+        unheard.hear(&heard("c", HeardStatus::Understood));
+        assert!(unheard.sentences.is_empty());
+    }
+
+    #[test]
+    fn what_is_refused_for_now_is_said_again() {
+        let refused = |code| {
+            let error = Some(toponym_proto::answer::Problem::new(code, "no"));
+            Heard { error, ..heard("a", HeardStatus::Refused) }
+        };
+        assert!(!is_final(&refused(ErrorCode::Busy)));
+        assert!(is_final(&refused(ErrorCode::NoSuchRobot)));
     }
 }

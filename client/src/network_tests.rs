@@ -46,7 +46,7 @@ async fn put<T: serde::Serialize>(router: &Session, key: String, value: &T) {
 }
 
 fn ack(boot: u64, seq: u64) -> Ack {
-    Ack { v: 1, robot: "r07".into(), boot, seq, durable: false, lost: 0 }
+    Ack { v: 1, robot: "r07".into(), boot, seq, lost: 0 }
 }
 
 fn setup() -> Setup {

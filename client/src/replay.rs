@@ -1,6 +1,7 @@
 //! Plays a recorded log to a server: the robot's streams and the guide's sentences, in the log's
 //! order and at a multiple of its pace.
 
+use crate::guide::is_final;
 use crate::log::{LogRecord, Records};
 use crate::{ClientError, Guide, Planner, Robot, RobotConfig};
 use std::collections::BTreeMap;
@@ -14,8 +15,9 @@ use zenoh::Session;
 
 /// How long the filter may take for what it was handed before the end.
 const FILTER_WAIT: Duration = Duration::from_secs(300);
-/// Feedback comes right behind the filter; this long after the last nothing more will.
-const FEEDBACK_QUIET: Duration = Duration::from_secs(2);
+/// Feedback comes right behind the filter, and what is not heard is said again; this long after the last nothing more
+/// will come.
+const FEEDBACK_QUIET: Duration = Duration::from_secs(30);
 
 /// How a log is played.
 #[derive(Clone, Debug)]
@@ -165,6 +167,9 @@ impl Player<'_> {
     }
 
     fn take(&mut self, heard: &Heard) {
+        if !is_final(heard) {
+            return;
+        }
         if let Some(text) = self.waiting.remove(&heard.id) {
             self.done.heard += 1;
             (self.tell)(Progress::Heard(&text, heard));

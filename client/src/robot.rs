@@ -74,7 +74,7 @@ impl RobotConfig {
             form: Form::Bincode,
             in_flight_max: 1000,
             resend_after: Duration::from_secs(2),
-            patience: Duration::from_secs(60),
+            patience: Duration::from_secs(3600),
         }
     }
 }

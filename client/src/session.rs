@@ -81,8 +81,13 @@ pub fn endpoint(given: Option<&str>) -> String {
 /// # Errors
 /// [`ClientError::NoServer`] if nobody listens there.
 pub async fn open(endpoint: &str) -> Result<Session, ClientError> {
-    let settings: [(&str, Value); 4] = [
+    let settings: [(&str, Value); 5] = [
         ("mode", json!("client")),
+        // A server that was restarted is there again within a second.
+        (
+            "connect/retry",
+            json!({"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 1.5}),
+        ),
         ("connect/endpoints", json!([endpoint])),
         ("scouting/multicast/enabled", json!(false)),
         ("scouting/gossip/enabled", json!(false)),

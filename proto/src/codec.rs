@@ -2,9 +2,9 @@
 
 use crate::keys::Input;
 use crate::stream::{End, Message, Odom, Say, Scan, Setup};
-use crate::validate::{Invalid, Limits};
-use serde::Serialize;
+use crate::validate::{BOOT_MAX, Invalid, Limits, SEQ_MAX};
 use serde::de::DeserializeOwned;
+use serde::{Deserialize, Serialize};
 
 /// Zenoh encoding of JSON payloads.
 pub const ENCODING_JSON: &str = "application/json";
@@ -133,6 +133,27 @@ impl Message {
     }
 }
 
+/// Place in its robot's stream, (boot, seq), of a message that could not be read otherwise; none if that can't be
+/// read either.
+pub fn place_of(encoding: &str, bytes: &[u8]) -> Option<(u64, u64)> {
+    #[derive(Deserialize)]
+    struct Place {
+        boot: u64,
+        seq: u64,
+    }
+    let (boot, seq) = if is_json(encoding, bytes) {
+        let place: Place = serde_json::from_slice(bytes).ok()?;
+        (place.boot, place.seq)
+    } else {
+        let [VERSION, _, body @ ..] = bytes else { return None };
+        let format = FORMAT.with_limit::<ALLOCATION_MAX_BYTES>();
+        let read = bincode::serde::decode_from_slice::<(String, u64, u64), _>(body, format);
+        let ((_, boot, seq), _) = read.ok()?;
+        (boot, seq)
+    };
+    (boot <= BOOT_MAX && seq <= SEQ_MAX).then_some((boot, seq))
+}
+
 fn check_size(bytes: &[u8], limits: &Limits) -> Result<(), Refused> {
     if bytes.len() > limits.payload_bytes {
         return Err(Refused::TooLarge { bytes: bytes.len(), max: limits.payload_bytes });
@@ -186,7 +207,7 @@ mod tests {
     const STAMP_NS: i64 = 4_000_000_000_000_000_000;
 
     fn header() -> impl Strategy<Value = Header> {
-        ("[a-z0-9][a-z0-9_-]{0,8}", 0..1_u64 << 53, 0..1_u64 << 53, -STAMP_NS..STAMP_NS).prop_map(
+        ("[a-z0-9][a-z0-9_-]{0,8}", 0..BOOT_MAX, 0..SEQ_MAX, -STAMP_NS..STAMP_NS).prop_map(
             |(robot, boot, seq, ns)| Header {
                 robot: format!("r{robot}"),
                 boot,
@@ -332,6 +353,18 @@ mod tests {
         let small = Limits { payload_bytes: 4, ..Limits::default() };
         let refused = Message::decode(&Input::Odom, "", b"12345", &small).unwrap_err();
         assert_eq!(refused, Refused::TooLarge { bytes: 5, max: 4 });
+    }
+
+    #[test]
+    fn the_place_of_a_bad_message_is_read() {
+        let json = br#"{"robot": "R", "boot": 7, "seq": 9, "stamp": "now", "odom": []}"#;
+        assert_eq!(place_of(ENCODING_JSON, json), Some((7, 9)));
+        let mut bytes = vec![VERSION, 3];
+        append(&mut bytes, &("R 1", 7_u64, 9_u64, "what is this")).unwrap();
+        assert_eq!(place_of(ENCODING_BINCODE, &bytes), Some((7, 9)));
+        for bad in [&b"{"[..], b"", &[VERSION, 3, 1], br#"{"boot": 9007199254740991, "seq": 1}"#] {
+            assert_eq!(place_of("", bad), None);
+        }
     }
 
     #[test]

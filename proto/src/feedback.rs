@@ -30,6 +30,8 @@ pub struct Heard {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum HeardStatus {
+    /// It is on disk, and was read; what becomes of it is told next.
+    Read,
     /// The map knows it.
     Understood,
     /// The guide is asked something first.
@@ -88,7 +90,8 @@ pub enum PoseState {
     Unknown,
 }
 
-/// On `out/ack`: everything of this boot up to and with `seq` was handed to the map, or given up.
+/// On `out/ack`: everything of this boot up to and with `seq` is on disk and will be in the map, whatever happens;
+/// or it was given up.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Ack {
     /// [`crate::answer::ANSWER_VERSION`].
@@ -99,8 +102,6 @@ pub struct Ack {
     pub boot: u64,
     /// The watermark; nothing at or below it need be sent again.
     pub seq: u64,
-    /// Whether all of it is in a record on disk.
-    pub durable: bool,
     /// Messages given up since the server started.
     pub lost: u64,
 }

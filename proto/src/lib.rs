@@ -14,6 +14,7 @@
 pub mod answer;
 pub mod codec;
 pub mod feedback;
+pub mod frame;
 pub mod keys;
 pub mod merge;
 pub mod record;

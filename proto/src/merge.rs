@@ -9,7 +9,10 @@
 //! that is needed; online, [`HoldBack`] keeps the stream back for a while, so that a sentence that
 //! arrives over another connection still finds its place.
 
+use crate::codec::Refused;
 use crate::stream::{Message, Say, Stamp};
+use crate::validate::Limits;
+use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
@@ -66,11 +69,22 @@ impl Sentences {
 /// the one before, whatever its clock says.
 type At = (u64, Stamp);
 
+/// All that a [`HoldBack`] holds; messages in their bincode form, with when they arrived.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Held {
+    hold: Duration,
+    stream: Vec<(Duration, Vec<u8>)>,
+    /// Each with the robot's boot.
+    sentences: Vec<(Duration, u64, Vec<u8>)>,
+    newest: Option<(u64, i64)>,
+    passed: Option<(u64, i64)>,
+}
+
 /// Keeps a robot's stream back by a fixed time after arrival and lets sentences in where the rule
 /// wants them. A sentence whose place has passed enters at once.
 ///
 /// Time is passed in: seconds on any clock that never steps back.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub struct HoldBack {
     /// How long a message waits for sentences.
     hold: Duration,
@@ -125,10 +139,58 @@ impl HoldBack {
         self.held.is_empty() && self.waiting.is_empty()
     }
 
-    /// Drops all that is held.
-    pub fn clear(&mut self) {
-        self.held.clear();
-        self.waiting.clear();
+    /// How long messages are held.
+    pub fn hold(&self) -> Duration {
+        self.hold
+    }
+
+    /// How long messages are held, from now on.
+    pub fn set_hold(&mut self, hold: Duration) {
+        self.hold = hold;
+    }
+
+    /// All that is held, to be written down.
+    ///
+    /// # Errors
+    /// If a message can't be encoded.
+    pub fn held(&self) -> Result<Held, Refused> {
+        let at = |at: Option<At>| at.map(|(boot, stamp)| (boot, stamp.ns));
+        Ok(Held {
+            hold: self.hold,
+            stream: self
+                .held
+                .iter()
+                .map(|(t, m)| Ok((*t, m.to_bincode()?)))
+                .collect::<Result<_, Refused>>()?,
+            sentences: self
+                .waiting
+                .iter()
+                .map(|(((boot, _), _), (t, say))| Ok((*t, *boot, Message::Say(say.clone()).to_bincode()?)))
+                .collect::<Result<_, Refused>>()?,
+            newest: at(self.newest),
+            passed: at(self.passed),
+        })
+    }
+
+    /// What [`HoldBack::held`] told.
+    ///
+    /// # Errors
+    /// If a message can't be read.
+    pub fn of(held: &Held) -> Result<Self, Refused> {
+        let at = |at: Option<(u64, i64)>| at.map(|(boot, ns)| (boot, Stamp { ns }));
+        let read = |bytes: &[u8]| Message::from_bincode(bytes, &Limits::NONE);
+        let mut back = Self::new(held.hold, at(held.newest));
+        back.passed = at(held.passed);
+        for (arrived, bytes) in &held.stream {
+            back.held.push_back((*arrived, read(bytes)?));
+        }
+        for (arrived, boot, bytes) in &held.sentences {
+            if let Message::Say(say) = read(bytes)? {
+                let began = say.began.unwrap_or_default();
+                back.waiting.insert(((*boot, began), say.id.clone()), (*arrived, say));
+            }
+        }
+        Ok(back)
     }
 
     /// Takes the next message that is due at `now`; [`Duration::MAX`] takes all.

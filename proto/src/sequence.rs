@@ -18,7 +18,18 @@ pub enum Step {
         /// First seq that is there again.
         to: u64,
     },
+    /// A message came that could not be used; it was told why.
+    Refused {
+        /// Of this boot.
+        boot: u64,
+        /// Its seq.
+        seq: u64,
+    },
 }
+
+/// A robot that is known keeps no more in flight than a few thousand messages: a seq further ahead is a mistake, or forged,
+/// and waiting for all before it would shut the robot out.
+const AHEAD_MAX: u64 = 1 << 20;
 
 /// What was dropped, and why.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -27,6 +38,8 @@ pub struct Dropped {
     pub repeated: u64,
     /// Messages of a boot before the newest.
     pub stale: u64,
+    /// Messages whose seq is absurdly far ahead.
+    pub absurd: u64,
 }
 
 /// How long a missing message is waited for.
@@ -52,7 +65,7 @@ pub struct Sequencer {
     /// Seq that comes next.
     next: u64,
     /// Came too early, each with its time of arrival.
-    early: BTreeMap<u64, (Duration, Message)>,
+    early: BTreeMap<u64, (Duration, Step)>,
     /// In order, not yet taken.
     ready: VecDeque<Step>,
     dropped: Dropped,
@@ -74,9 +87,20 @@ impl Sequencer {
 
     /// Takes in a message; one without a header is none of a robot's.
     pub fn push(&mut self, now: Duration, message: Message) {
-        let Some(&Header { boot, seq, .. }) = message.header() else {
-            return;
-        };
+        if let Some(&Header { boot, seq, .. }) = message.header() {
+            self.put(now, (boot, seq), Step::Message(message));
+        }
+    }
+
+    /// Takes note of a message that can't be used, but whose place is known: it is not waited for.
+    pub fn refuse(&mut self, now: Duration, (boot, seq): (u64, u64)) {
+        // It may be forged in part: only what continues the stream is believed.
+        if self.boot == Some(boot) && seq >= self.next && seq - self.next <= self.patience.window as u64 {
+            self.put(now, (boot, seq), Step::Refused { boot, seq });
+        }
+    }
+
+    fn put(&mut self, now: Duration, (boot, seq): (u64, u64), step: Step) {
         match self.boot {
             Some(current) if boot < current => {
                 self.dropped.stale += 1;
@@ -93,7 +117,11 @@ impl Sequencer {
             self.dropped.repeated += 1;
             return;
         }
-        self.early.insert(seq, (now, message));
+        if self.joined && seq - self.next > AHEAD_MAX {
+            self.dropped.absurd += 1;
+            return;
+        }
+        self.early.insert(seq, (now, step));
         self.take_ready();
     }
 
@@ -121,8 +149,8 @@ impl Sequencer {
     }
 
     fn take_ready(&mut self) {
-        while let Some((_, message)) = self.early.remove(&self.next) {
-            self.ready.push_back(Step::Message(message));
+        while let Some((_, step)) = self.early.remove(&self.next) {
+            self.ready.push_back(step);
             (self.joined, self.next) = (true, self.next + 1);
         }
     }
@@ -198,12 +226,40 @@ mod tests {
                 match step {
                     Step::Message(m) => seen.extend(m.header().map(|h| h.seq)),
                     Step::Lost { from, to, .. } => lost.extend(from..to),
+                    Step::Refused { .. } => unreachable!(),
                 }
             }
             let last = *present.last().unwrap();
             prop_assert_eq!(seen, present.iter().copied().collect::<Vec<_>>());
             prop_assert_eq!(lost, (0..last).filter(|i| !present.contains(i)).collect::<Vec<_>>());
         }
+    }
+
+    #[test]
+    fn a_seq_far_ahead_shuts_nobody_out() {
+        let mut s = Sequencer::new(patience(100), None);
+        s.push(Duration::ZERO, odom(0, 0));
+        s.push(Duration::ZERO, odom(0, (1 << 46) - 1));
+        s.push(Duration::ZERO, odom(0, 1));
+        assert_eq!((drain(&mut s, JOIN), s.dropped().absurd), (messages(0, [0, 1]), 1));
+    }
+
+    #[test]
+    fn what_was_refused_is_not_waited_for() {
+        let mut s = Sequencer::new(patience(100), None);
+        s.push(Duration::ZERO, odom(3, 0));
+        s.push(Duration::ZERO, odom(3, 2));
+        s.refuse(Duration::ZERO, (3, 1));
+        let refused = Step::Refused { boot: 3, seq: 1 };
+        assert_eq!(
+            drain(&mut s, Duration::ZERO),
+            [messages(3, [0]), vec![refused], messages(3, [2])].concat()
+        );
+        for forged in [(4, 0), (3, 1), (3, (1 << 53) - 1)] {
+            s.refuse(Duration::ZERO, forged);
+        }
+        s.push(Duration::ZERO, odom(3, 3));
+        assert_eq!(drain(&mut s, Duration::ZERO), messages(3, [3]));
     }
 
     #[test]

@@ -14,7 +14,7 @@ pub struct ServerConfig {
     pub site: String,
     /// Zenoh endpoints to listen on. Beyond loopback everybody on the network can connect.
     pub listen: Vec<String>,
-    /// Folder of the saved maps.
+    /// Folder of the maps: a journal and checkpoints of each.
     pub data: PathBuf,
     /// How long a robot's stream waits for sentences that come over other connections.
     pub hold_back_s: f64,
@@ -32,6 +32,8 @@ pub struct ServerConfig {
     pub robots_max: usize,
     /// Maps that are kept.
     pub maps_max: usize,
+    /// Whether what people say goes into the log.
+    pub log_speech: bool,
     /// Limits of what is taken in.
     pub limits: Limits,
     /// The filter of new maps.
@@ -52,6 +54,7 @@ impl Default for ServerConfig {
             graph_period_s: 1.0,
             robots_max: 64,
             maps_max: 16,
+            log_speech: false,
             limits: Limits::default(),
             mapper: toponym_core::Config::default(),
         }

@@ -95,8 +95,8 @@ pub fn pose_state(state: TrackState) -> PoseState {
     }
 }
 
-/// Feedback on a sentence; `durable`: whether it is on disk.
-pub fn heard(h: effects::Heard, durable: bool) -> Heard {
+/// Feedback on a sentence that entered the map, and so is on disk.
+pub fn heard(h: effects::Heard) -> Heard {
     Heard {
         id: h.id,
         status: match h.status {
@@ -105,7 +105,7 @@ pub fn heard(h: effects::Heard, durable: bool) -> Heard {
             effects::HeardStatus::NotUnderstood => HeardStatus::NotUnderstood,
             effects::HeardStatus::Refused => HeardStatus::Refused,
         },
-        durable,
+        durable: true,
         parse: h.parse,
         grounded: h.grounded.into_iter().map(|(place, p)| Grounded { place, p }).collect(),
         words: h.words,

@@ -1,29 +1,19 @@
-//! The data folder: saved maps.
+//! The data folder: a journal per map, in a folder of the map's id.
 //!
-//! Per map `{id}.map`, what [`Mapper::save`] wrote, and `{id}.json`, what the core doesn't know of
-//! it ([`Card`]). Both are replaced whole: written aside, made durable, renamed. The card comes
-//! second: should the machine stop in between, messages after the older watermark come again.
+//! Files of earlier builds, `{id}.map` and `{id}.json`, begin a journal when they are found; they are kept
+//! under `{id}.map.imported`.
 
-use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::Write;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io;
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use toponym_core::Mapper;
+use toponym_journal::disk::sync_folder;
+use toponym_journal::{Checkpoint, Entry, Folder, Identity, Journal, JournalError, Opened};
 use toponym_proto::keys::check_id;
 
-/// What is known of a map beside the map.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Card {
-    /// Born once with the map.
-    pub uuid: String,
-    /// The robot that maps it.
-    pub robot: String,
-    /// (boot, seq) of the last message in it.
-    pub watermark: Option<(u64, u64)>,
-    /// Newest stamp in it, ns.
-    pub stamp_ns: i64,
-}
+use crate::fold::{Card, Fold, FoldError};
 
 /// The data folder can't be used.
 #[derive(Debug, thiserror::Error)]
@@ -34,26 +24,51 @@ pub enum StoreError {
         /// Which file or folder.
         path: PathBuf,
         /// Why.
-        source: std::io::Error,
+        source: io::Error,
     },
     /// Another process has it.
     #[error("{}: another server uses this data folder; stop it or set another `data`", .0.display())]
     InUse(PathBuf),
+    /// A map's journal can't be read or written. It is left as it is.
+    #[error("{}: {source}", path.display())]
+    Journal {
+        /// The map's folder.
+        path: PathBuf,
+        /// What and where.
+        source: JournalError,
+    },
     /// A saved map can't be understood. It is left as it is.
-    #[error(
-        "{}: {reason}; move it away to start without this map, or use the build that wrote it",
-        path.display()
-    )]
-    Broken {
+    #[error("{}: {source}", path.display())]
+    Fold {
+        /// The map's folder, or file.
+        path: PathBuf,
+        /// Why.
+        source: FoldError,
+    },
+    /// What is known beside a saved map of an earlier build can't be read.
+    #[error("{}: {source}", path.display())]
+    Card {
         /// Which file.
         path: PathBuf,
         /// Why.
-        reason: String,
+        source: serde_json::Error,
     },
 }
 
-fn io_error(path: &Path) -> impl FnOnce(std::io::Error) -> StoreError + '_ {
+fn io_error(path: &Path) -> impl FnOnce(io::Error) -> StoreError + '_ {
     move |source| StoreError::Io { path: path.into(), source }
+}
+
+/// A map as it was found.
+pub struct Found {
+    /// The map as of its last checkpoint.
+    pub fold: Fold,
+    /// What it took in after that, with numbers.
+    pub tail: Vec<(u64, Entry)>,
+    /// Goes on with it.
+    pub journal: Journal<Folder>,
+    /// What was mended, for people.
+    pub mended: Vec<String>,
 }
 
 /// The folder, held for this process alone.
@@ -77,48 +92,101 @@ impl Store {
         }
     }
 
-    /// All saved maps by id.
-    pub fn load(&self) -> Result<BTreeMap<String, (Mapper, Card)>, StoreError> {
-        let mut maps = BTreeMap::new();
+    /// Folder of a map's journal.
+    pub fn journal(&self, id: &str) -> Folder {
+        Folder(self.folder.join(id))
+    }
+
+    /// Ids of all maps there are.
+    pub fn ids(&self) -> Result<Vec<String>, StoreError> {
+        let mut ids = Vec::new();
         for entry in fs::read_dir(&self.folder).map_err(io_error(&self.folder))? {
             let path = entry.map_err(io_error(&self.folder))?.path();
-            let id = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
-            if path.extension().is_none_or(|e| e != "map") || check_id("map", id).is_err() {
-                continue;
+            let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
+            let is_map = path.is_dir() || path.extension().is_some_and(|e| e == "map");
+            match name.and_then(|name| name.to_str()) {
+                Some(id) if is_map && check_id("map", id).is_ok() => ids.push(id.to_owned()),
+                _ => {}
             }
-            let broken = |path: &Path, reason: String| StoreError::Broken { path: path.into(), reason };
-            let bytes = fs::read(&path).map_err(io_error(&path))?;
-            let mapper = Mapper::load(&bytes).map_err(|e| broken(&path, e.to_string()))?;
-            let card_path = path.with_extension("json");
-            let text = fs::read(&card_path).map_err(io_error(&card_path))?;
-            let card = serde_json::from_slice(&text).map_err(|e| broken(&card_path, e.to_string()))?;
-            maps.insert(id.to_string(), (mapper, card));
         }
-        Ok(maps)
+        ids.sort();
+        ids.dedup();
+        Ok(ids)
     }
 
-    /// Saves a map; when this returns it is on the medium.
-    pub fn save(&self, id: &str, map: &[u8], card: &Card) -> Result<(), StoreError> {
-        self.replace(&format!("{id}.map"), map)?;
-        let path = self.folder.join(format!("{id}.json"));
-        let text = serde_json::to_vec_pretty(card)
-            .map_err(|e| StoreError::Broken { path, reason: e.to_string() })?;
-        self.replace(&format!("{id}.json"), &text)
+    /// Reads a map. `hold`: how long the stream of one of an earlier build waits for sentences.
+    pub fn load(&self, id: &str, hold: Duration) -> Result<Found, StoreError> {
+        let disk = self.journal(id);
+        if !disk.0.is_dir() || has_no_files(&disk.0) {
+            self.import(id, hold)?;
+        }
+        let path = disk.0.clone();
+        let opened =
+            Journal::open(disk).map_err(|source| StoreError::Journal { path: path.clone(), source })?;
+        let Opened { journal, checkpoint, tail, mended } = opened;
+        let fold = Fold::load(&checkpoint.map).map_err(|source| StoreError::Fold { path, source })?;
+        Ok(Found { fold, tail, journal, mended })
     }
 
-    fn replace(&self, name: &str, bytes: &[u8]) -> Result<(), StoreError> {
-        let aside = self.folder.join(format!("{name}.new"));
-        let mut file = File::create(&aside).map_err(io_error(&aside))?;
-        file.write_all(bytes).and_then(|()| file.sync_all()).map_err(io_error(&aside))?;
-        let path = self.folder.join(name);
-        fs::rename(&aside, &path).map_err(io_error(&path))?;
-        File::open(&self.folder).and_then(|folder| folder.sync_all()).map_err(io_error(&self.folder))
+    /// Begins a map's journal; when this returns it is durable.
+    pub fn create(&self, id: &str, fold: &Fold) -> Result<Journal<Folder>, StoreError> {
+        let disk = self.journal(id);
+        let path = disk.0.clone();
+        fs::create_dir_all(&path).map_err(io_error(&path))?;
+        sync_folder(&self.folder).map_err(io_error(&self.folder))?;
+        let map = fold.save().map_err(|source| StoreError::Fold { path: path.clone(), source })?;
+        Journal::create(disk, identity(fold), map).map_err(|source| StoreError::Journal { path, source })
     }
+
+    /// Begins the journal of a map that an earlier build saved.
+    fn import(&self, id: &str, hold: Duration) -> Result<(), StoreError> {
+        let (map, card) = (self.folder.join(format!("{id}.map")), self.folder.join(format!("{id}.json")));
+        let bytes = fs::read(&map).map_err(io_error(&map))?;
+        let mapper = Mapper::load(&bytes)
+            .map_err(|e| StoreError::Fold { path: map.clone(), source: FoldError::Map(e) })?;
+        let text = fs::read(&card).map_err(io_error(&card))?;
+        let known: Card = serde_json::from_slice(&text)
+            .map_err(|source| StoreError::Card { path: card.clone(), source })?;
+        self.create(id, &Fold::new(mapper, known, hold))?;
+        for path in [map, card] {
+            let mut kept = path.clone().into_os_string();
+            kept.push(".imported");
+            fs::rename(&path, kept).map_err(io_error(&path))?;
+        }
+        Ok(())
+    }
+}
+
+/// Whether a folder is there, but a start that was cut short left nothing in it.
+fn has_no_files(folder: &Path) -> bool {
+    let is_file = |entry: io::Result<fs::DirEntry>| {
+        entry.is_ok_and(|entry| !entry.file_name().to_string_lossy().starts_with("new."))
+    };
+    !fs::read_dir(folder).is_ok_and(|mut entries| entries.any(is_file))
+}
+
+/// What stands at the head of each file of a map.
+pub fn identity(fold: &Fold) -> Identity {
+    let config = fold.mapper.config();
+    let mut hash = DefaultHasher::new();
+    format!("{config:?}").hash(&mut hash);
+    Identity {
+        uuid: fold.card.uuid.clone(),
+        build: format!("{} {}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH),
+        config: hash.finish(),
+        seed: config.seed,
+    }
+}
+
+/// The map after entry `index`, to be written.
+pub fn checkpoint(fold: &Fold, index: u64) -> Result<Checkpoint, FoldError> {
+    Ok(Checkpoint { identity: identity(fold), index, map: fold.save()? })
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toponym_journal::Event;
 
     fn folder(name: &str) -> PathBuf {
         let path = std::env::temp_dir().join(format!("toponym-store-{}-{name}", std::process::id()));
@@ -126,44 +194,58 @@ mod tests {
         path
     }
 
-    fn card() -> Card {
-        Card { uuid: "u".into(), robot: "r1".into(), watermark: Some((1, 2)), stamp_ns: 3 }
+    fn fold() -> Fold {
+        let card = Card { uuid: "u".into(), robot: "r1".into(), watermark: Some((1, 2)), stamp_ns: 3 };
+        Fold::new(Mapper::new(toponym_core::Config::default()), card, Duration::ZERO)
+    }
+
+    fn load(store: &Store) -> Result<Found, StoreError> {
+        store.load("main", Duration::ZERO)
     }
 
     #[test]
-    fn what_was_saved_is_loaded() {
-        let path = folder("saved");
+    fn what_was_written_is_found() {
+        let path = folder("written");
         let store = Store::open(&path).unwrap();
-        let map = Mapper::new(toponym_core::Config::default()).save().unwrap();
-        store.save("main", &map, &card()).unwrap();
-        store.save("main", &map, &Card { watermark: Some((1, 9)), ..card() }).unwrap();
-        let maps = store.load().unwrap();
-        let (mapper, known) = &maps["main"];
-        assert_eq!((mapper.save().unwrap() == map, known.watermark), (true, Some((1, 9))));
+        let mut journal = store.create("main", &fold()).unwrap();
+        let entry = Entry { at_ns: 9, event: Event::Tick };
+        journal.append(&entry.to_bytes().unwrap());
+        journal.commit().unwrap();
+        assert_eq!(store.ids().unwrap(), ["main"]);
+        let found = load(&store).unwrap();
+        assert_eq!((found.fold.card, found.tail), (fold().card, vec![(1, entry)]));
         fs::remove_dir_all(path).unwrap();
     }
 
     #[test]
-    fn what_is_half_written_does_not_count() {
-        let path = folder("half");
+    fn a_map_of_an_earlier_build_begins_a_journal() {
+        let path = folder("earlier");
         let store = Store::open(&path).unwrap();
-        let map = Mapper::new(toponym_core::Config::default()).save().unwrap();
-        store.save("main", &map, &card()).unwrap();
-        fs::write(path.join("main.map.new"), b"half").unwrap();
-        fs::write(path.join("main.json.new"), b"half").unwrap();
-        assert_eq!(store.load().unwrap()["main"].1, card());
+        fs::write(path.join("main.map"), fold().mapper.save().unwrap()).unwrap();
+        fs::write(path.join("main.json"), serde_json::to_vec(&fold().card).unwrap()).unwrap();
+        // A start that was cut short.
+        fs::create_dir(path.join("main")).unwrap();
+        for _ in 0..2 {
+            assert_eq!(store.ids().unwrap(), ["main"]);
+            assert_eq!(load(&store).unwrap().fold.card, fold().card);
+        }
+        assert!(path.join("main.map.imported").is_file());
         fs::remove_dir_all(path).unwrap();
     }
 
     #[test]
-    fn a_broken_file_is_named() {
+    fn a_broken_map_is_named() {
         let path = folder("broken");
         let store = Store::open(&path).unwrap();
-        let map = Mapper::new(toponym_core::Config::default()).save().unwrap();
-        store.save("main", &map, &card()).unwrap();
-        fs::write(path.join("main.json"), b"{").unwrap();
-        let error = store.load().unwrap_err().to_string();
-        assert!(error.contains("main.json") && error.contains("move it away"), "{error}");
+        store.create("main", &fold()).unwrap();
+        let file = path.join("main").join(toponym_journal::checkpoint::name(0));
+        fs::write(&file, b"no map").unwrap();
+        let error = load(&store).err().unwrap().to_string();
+        assert!(
+            error.contains("main") && error.contains(".checkpoint") && error.contains("byte 0"),
+            "{error}"
+        );
+        assert_eq!(fs::read(&file).unwrap(), b"no map");
         fs::remove_dir_all(path).unwrap();
     }
 

@@ -1,7 +1,8 @@
 //! Start, stop, and what outlives them.
 
-use crate::site::{Folder, Site, drive, settings};
+use crate::site::{Folder, Site, drive, saved_map, settings, setup};
 use toponym_proto::answer::{GraphReply, Info};
+use toponym_proto::keys::Ask;
 use toponym_server::serve::{Server, serve};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -38,8 +39,7 @@ async fn a_map_outlives_the_server() {
     }
     acks.ack_of(81).await;
     site.stop().await;
-    let map = |folder: &Folder| std::fs::read(folder.0.join("data/main.map")).unwrap();
-    assert!(map(&folder) == map(&whole));
+    assert!(saved_map(&folder, "main") == saved_map(&whole, "main"));
 }
 
 #[tokio::test(flavor = "multi_thread")]
@@ -53,7 +53,7 @@ async fn do_save_writes_the_map() {
     graphs.until(|graph: &GraphReply| graph.places.len() > 3).await;
     let done = site.ask(&site.keys.command("save"), "").await.unwrap();
     assert_eq!(done["maps"][0], "main");
-    let saved = std::fs::read(folder.0.join("data/main.map")).unwrap();
+    let saved = saved_map(&folder, "main");
     assert!(toponym_core::Mapper::load(&saved).unwrap().snapshot().graph().places.len() > 3);
     site.stop().await;
 }
@@ -85,7 +85,7 @@ async fn a_record_is_never_overwritten() {
     std::fs::write(&record, b"the only one").unwrap();
     let error =
         Server::start(settings(&folder), Some(record.clone())).await.err().expect("an error").to_string();
-    assert!(error.contains("run.rec") && error.contains("move the earlier record away"), "{error}");
+    assert!(error.contains("run.rec") && error.contains("move it away"), "{error}");
     assert_eq!(std::fs::read(&record).unwrap(), b"the only one");
 }
 
@@ -119,20 +119,39 @@ async fn a_map_that_cannot_be_saved_is_an_error_of_the_stop() {
     }
     acks.ack_of(2).await;
     // A folder stands where the map is to be written.
-    std::fs::create_dir(folder.0.join("data/main.map.new")).unwrap();
+    std::fs::create_dir(folder.0.join("data/main/new.checkpoint")).unwrap();
     let error = site.server.stop().await.unwrap_err().to_string();
-    assert!(error.contains("map main could not be saved") && error.contains("main.map.new"), "{error}");
+    assert!(error.contains("map main could not be saved") && error.contains(".checkpoint"), "{error}");
 }
 
 #[tokio::test(flavor = "multi_thread")]
-async fn a_broken_map_is_not_overwritten() {
+async fn a_broken_map_stops_only_itself() {
     let folder = Folder::new();
-    let config = settings(&folder);
-    std::fs::create_dir_all(&config.data).unwrap();
-    let path = config.data.join("main.map");
+    let site = Site::start(settings(&folder)).await;
+    for map in ["main", "annex"] {
+        let robot = format!("r-{map}");
+        let acks = site.acks(&robot).await;
+        for message in drive(&robot, map).iter().take(9) {
+            site.send(message).await;
+        }
+        acks.ack_of(8).await;
+    }
+    site.stop().await;
+    let path = folder.0.join("data/main/00000000000000000000.checkpoint");
+    let files = std::fs::read_dir(path.parent().unwrap()).unwrap().map(|e| e.unwrap().path());
+    files
+        .filter(|f| f.extension().is_some_and(|e| e == "checkpoint"))
+        .for_each(|f| std::fs::remove_file(f).unwrap());
     std::fs::write(&path, b"no map").unwrap();
-    let error = Server::start(config, None).await.err().expect("an error").to_string();
-    assert!(error.contains("main.map"), "{error}");
+
+    let site = Site::start(settings(&folder)).await;
+    let problem = site.ask(&site.keys.ask("main", Ask::Labels), "").await.unwrap_err();
+    assert!(problem.message.contains("checkpoint: damaged at byte 0"), "{problem}");
+    site.ask(&site.keys.ask("annex", Ask::Labels), "").await.unwrap();
+    let states = site.states("r-main").await;
+    site.send(&setup("r-main", "main")).await;
+    states.state(|s| s.error.as_ref().is_some_and(|e| e.message.contains("can't be loaded"))).await;
+    site.stop().await;
     assert_eq!(std::fs::read(&path).unwrap(), b"no map");
 }
 

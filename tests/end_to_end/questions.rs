@@ -1,6 +1,6 @@
 //! Every query gets a reply, whatever is asked and whenever.
 
-use crate::site::{Folder, Site, drive, recorded, say, settings};
+use crate::site::{Folder, Site, drive, recorded, saved_map, say, settings};
 use toponym_core::Mapper;
 use toponym_proto::answer::{
     ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, WhereReply,
@@ -134,7 +134,7 @@ async fn what_was_said_is_mended_and_a_replay_mends_it_too() {
     for message in recorded(&record) {
         mapper.step(convert::event(message));
     }
-    assert!(mapper.save().unwrap() == std::fs::read(folder.0.join("data/main.map")).unwrap());
+    assert!(mapper.save().unwrap() == saved_map(&folder, "main"));
 }
 
 #[tokio::test(flavor = "multi_thread")]

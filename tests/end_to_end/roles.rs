@@ -1,6 +1,6 @@
 //! The client library's roles against the real server.
 
-use crate::site::{Folder, PATIENCE, Site, drive, settings};
+use crate::site::{Folder, PATIENCE, Site, drive, saved_map, settings};
 use std::time::Duration;
 use toponym::{Guide, Planner, Robot, RobotConfig};
 use toponym_proto::answer::{ErrorCode, HeardStatus};
@@ -57,10 +57,10 @@ async fn a_restart_of_the_server_loses_nothing() {
         }
         robot.settle().await.unwrap();
         assert_eq!(robot.acked().unwrap().lost, 0);
+        Planner::new(&session, "default", "main", PATIENCE).unwrap().save().await.unwrap();
         server.unwrap().stop().await.unwrap();
     }
-    let map = |folder: &Folder| std::fs::read(folder.0.join("data/main.map")).unwrap();
-    assert!(map(&folder) == map(&whole));
+    assert!(saved_map(&folder, "main") == saved_map(&whole, "main"));
 }
 
 #[tokio::test(flavor = "multi_thread")]

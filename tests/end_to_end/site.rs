@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::Duration;
-use toponym_proto::answer::{Ack, ErrorReply, Heard, Problem, RobotState};
+use toponym_proto::answer::{Ack, ErrorReply, Heard, HeardStatus, Problem, RobotState};
 use toponym_proto::codec::{ENCODING_BINCODE, ENCODING_JSON};
 use toponym_proto::record::RecordReader;
 use toponym_proto::{Clock, End, Header, Keys, Laser, Message, Odom, Pose, Say, Scan, Setup, Stamp};
@@ -68,7 +68,13 @@ impl Site {
         Self { server, session, keys: Keys::new("default").unwrap() }
     }
 
+    /// All that was acknowledged is in the maps.
+    pub async fn settle(&self) {
+        self.ask(&self.keys.command("save"), "").await.unwrap();
+    }
+
     pub async fn stop(self) {
+        self.settle().await;
         self.server.stop().await.unwrap();
     }
 
@@ -165,8 +171,19 @@ impl Listener {
     }
 
     pub async fn heard(&self, id: &str) -> Heard {
-        self.until(|heard: &Heard| heard.id == id).await
+        self.until(|heard: &Heard| heard.id == id && heard.status != HeardStatus::Read).await
     }
+}
+
+/// A saved map: as [`toponym_core::Mapper::save`] wrote it.
+pub fn saved_map(folder: &Folder, map: &str) -> Vec<u8> {
+    let folder = folder.0.join("data").join(map);
+    let names = std::fs::read_dir(&folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap());
+    let newest =
+        names.filter(|name| name.ends_with(".checkpoint") && !name.starts_with("new")).max().unwrap();
+    let bytes = std::fs::read(folder.join(&newest)).unwrap();
+    let checkpoint = toponym_journal::Checkpoint::read(&newest, &bytes).unwrap();
+    toponym_server::fold::saved_map(&checkpoint.map).unwrap().to_vec()
 }
 
 /// The messages of a record file.

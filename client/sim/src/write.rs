@@ -9,7 +9,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 use std::io;
 use std::path::Path;
-use toponym_proto::record::RecordWriter;
+use toponym_proto::record::{Origin, RecordWriter};
 use toponym_proto::{Message, Pose, Scan};
 
 /// What CARMEN logs write where nothing was seen.
@@ -64,7 +64,8 @@ fn told(hypothesis: &Hypothesis) -> Value {
 /// Writes the robot's streams as a record file, as `serve --record` does, but without sentences:
 /// these are in the narration, as for any other log.
 pub fn record(messages: &[Message], out: impl io::Write) -> io::Result<()> {
-    let mut writer = RecordWriter::new(io::BufWriter::new(out)).map_err(io::Error::other)?;
+    let mut writer =
+        RecordWriter::new(io::BufWriter::new(out), &Origin::default()).map_err(io::Error::other)?;
     for message in messages.iter().filter(|m| !matches!(m, Message::Say(_))) {
         writer.write(message).map_err(io::Error::other)?;
     }

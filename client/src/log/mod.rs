@@ -19,7 +19,7 @@ use std::fmt::Write as _;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use toponym_proto::Message;
+use toponym_proto::{Message, record};
 
 /// A message of a log.
 #[derive(Clone, Debug, PartialEq)]
@@ -173,7 +173,7 @@ pub enum LogError {
 pub fn open(path: &Path, options: &Options) -> Result<Box<dyn Records>, LogError> {
     let mut notes = Notes { file: path.into(), ..Notes::default() };
     let bytes = read(path, &mut notes)?;
-    if bytes.starts_with(toponym_proto::record::MAGIC) {
+    if [record::MAGIC, record::MAGIC_1].iter().any(|magic| bytes.starts_with(magic)) {
         return Ok(Box::new(RecordedLog::new(bytes, notes)?));
     }
     if bytes.contains(&0) {

@@ -98,7 +98,7 @@ pub(super) fn seconds_text(stamp: Stamp) -> String {
 mod tests {
     use super::super::{CarmenLog, Narration, Options, merged};
     use super::*;
-    use toponym_proto::record::RecordWriter;
+    use toponym_proto::record::{Origin, RecordWriter};
 
     fn carmen(text: &str) -> Box<dyn Records> {
         Box::new(CarmenLog::new(text.into(), &Options::default(), Notes::default()).unwrap())
@@ -106,7 +106,7 @@ mod tests {
 
     fn recorded(log: Box<dyn Records>) -> Vec<u8> {
         let mut bytes = Vec::new();
-        let mut writer = RecordWriter::new(&mut bytes).unwrap();
+        let mut writer = RecordWriter::new(&mut bytes, &Origin::default()).unwrap();
         log.for_each(|r| writer.write(&r.message).unwrap());
         writer.flush().unwrap();
         drop(writer);
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn a_record_without_scans_is_an_error() {
         let mut bytes = Vec::new();
-        RecordWriter::new(&mut bytes).unwrap().flush().unwrap();
+        RecordWriter::new(&mut bytes, &Origin::default()).unwrap().flush().unwrap();
         let error = RecordedLog::new(bytes, Notes::default()).err().unwrap();
         assert!(matches!(error, LogError::NoScan { lines: 0, .. }), "{error}");
     }

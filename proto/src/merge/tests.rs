@@ -240,10 +240,21 @@ fn a_new_boot_has_a_clock_of_its_own() {
 }
 
 #[test]
-fn what_is_cleared_is_gone() {
+fn what_is_held_goes_on_when_it_was_written_down() {
     let mut hold = HoldBack::new(HOLD, None);
-    hold.push(Duration::ZERO, odom(0, 0));
-    hold.push_say(Duration::ZERO, 0, say(0, 1));
-    hold.clear();
-    assert_eq!((hold.is_empty(), hold.pop(Duration::MAX)), (true, None));
+    for seq in 0..6 {
+        hold.push(HOLD * seq as u32 / 8, odom_of(1, seq, seq as i64 * 10));
+    }
+    for (id, began) in [(0, 15), (1, 15), (2, 500)] {
+        hold.push_say(HOLD / 2, 1, say(id, began));
+    }
+    let _ = hold.pop(HOLD);
+    let mut again = HoldBack::of(&hold.held().unwrap()).unwrap();
+    let (mut got, mut got_again) = (Vec::new(), Vec::new());
+    for now in [HOLD, HOLD * 3 / 2, HOLD * 30] {
+        drain(&mut hold, now, &mut got);
+        drain(&mut again, now, &mut got_again);
+        assert_eq!(got, got_again);
+    }
+    assert_eq!(got.len(), 8);
 }

@@ -15,6 +15,7 @@ pub use args::{MapArgs, Preset};
 pub use canvas::Canvas;
 pub use report::build;
 
+use crate::fold::saved_map;
 use anyhow::{Context, Result, anyhow, bail};
 use history::History;
 use play::Played;
@@ -27,6 +28,7 @@ use timing::{Stage, Timing};
 use toponym::log::{self, Narration, Notes, Records};
 use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
 use toponym_core::{Answer, Mapper, Pose2, Query};
+use toponym_journal::Checkpoint;
 
 /// Runs `map`.
 pub fn run(args: &MapArgs) -> Result<()> {
@@ -51,8 +53,16 @@ pub fn run(args: &MapArgs) -> Result<()> {
 
 fn load(file: &Path) -> Result<Mapper> {
     let bytes = std::fs::read(file).with_context(|| format!("--start-map {}", file.display()))?;
-    Mapper::load(&bytes)
-        .with_context(|| format!("--start-map {}: give a file that --save-map wrote", file.display()))
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let map = if Checkpoint::is_one(&bytes) {
+        let checkpoint = Checkpoint::read(&name, &bytes).context("--start-map")?;
+        saved_map(&checkpoint.map).unwrap_or_default().to_vec()
+    } else {
+        bytes
+    };
+    Mapper::load(&map).with_context(|| {
+        format!("--start-map {}: give a file that --save-map wrote, or a server's checkpoint", file.display())
+    })
 }
 
 /// A log that was played to its end.

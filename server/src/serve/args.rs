@@ -13,7 +13,7 @@ pub struct ServeArgs {
     /// Settings (TOML); without it the defaults hold
     #[arg(long, value_name = "FILE")]
     pub config: Option<PathBuf>,
-    /// Record what the map takes in, in its order; `map FILE` plays it back. The file must not exist yet
+    /// Record what the map takes in, in its order; `map FILE` plays it back. A record that is there goes on
     #[arg(long, value_name = "FILE")]
     pub record: Option<PathBuf>,
     /// Check the settings and show them, but do not serve
@@ -22,9 +22,12 @@ pub struct ServeArgs {
     /// Listen here instead of where the settings say, e.g. tcp/0.0.0.0:7457
     #[arg(long, value_name = "ENDPOINT")]
     pub listen: Vec<String>,
-    /// Folder of the saved maps, instead of the settings'
+    /// Folder of the maps, instead of the settings'
     #[arg(long, value_name = "FOLDER")]
     pub data: Option<PathBuf>,
+    /// Log what people say, too
+    #[arg(long)]
+    pub log_speech: bool,
 }
 
 /// How logs are written to stderr.
@@ -64,6 +67,7 @@ impl ServeArgs {
         if let Some(data) = &self.data {
             config.data.clone_from(data);
         }
+        config.log_speech |= self.log_speech;
         config.check()?;
         Ok(config)
     }

@@ -3,14 +3,16 @@
 
 use arc_swap::ArcSwap;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Instant;
 use toponym_core::Snapshot;
-use toponym_proto::answer::{MapIdentity, RobotState};
+use toponym_proto::answer::{MapIdentity, Problem, RobotState};
 use toponym_proto::{Keys, Stamp};
 
-use super::mapping::Work;
+use super::scribe::Work;
+use crate::fold::Card;
 
 /// Locks; a thread that died while it held the lock left a whole value all the same.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -29,9 +31,17 @@ pub struct MapView {
     pub snapshot: ArcSwap<Snapshot>,
     /// Newest stamp in it, ns.
     pub stamp_ns: AtomicI64,
-    /// (boot, seq) up to which the stream is in a record on disk.
-    pub recorded: Mutex<Option<(u64, u64)>>,
-    /// Way to the map's own thread.
+    /// (boot, seq) of the last of its robot's messages that is on disk, or given up.
+    pub durable: Mutex<Option<(u64, u64)>>,
+    /// Bytes of messages on their way to the filter.
+    pub backlog_bytes: AtomicUsize,
+    /// Messages that are held back until time passes.
+    pub held: AtomicUsize,
+    /// Why the journal can't be written, as long as it can't.
+    pub trouble: Mutex<Option<String>>,
+    /// By when the filter is to stop, once the server does.
+    pub stops_at: Mutex<Option<Instant>>,
+    /// Way to the map's journal, and from there to its filter.
     pub work: SyncSender<Work>,
 }
 
@@ -40,6 +50,39 @@ impl MapView {
     pub fn identity(&self, snapshot: &Snapshot) -> MapIdentity {
         let (epoch, rev) = (snapshot.epoch(), snapshot.rev());
         MapIdentity { id: self.id.clone(), uuid: self.uuid.clone(), epoch, rev, level: None }
+    }
+
+    /// A view of a map that was loaded or born.
+    pub fn new(
+        id: &str,
+        card: &Card,
+        durable: Option<(u64, u64)>,
+        snapshot: Arc<Snapshot>,
+        work: SyncSender<Work>,
+    ) -> Self {
+        Self {
+            id: id.into(),
+            uuid: card.uuid.clone(),
+            robot: card.robot.clone(),
+            snapshot: ArcSwap::new(snapshot),
+            stamp_ns: AtomicI64::new(card.stamp_ns),
+            durable: Mutex::new(durable),
+            backlog_bytes: AtomicUsize::new(0),
+            held: AtomicUsize::new(0),
+            trouble: Mutex::default(),
+            stops_at: Mutex::default(),
+            work,
+        }
+    }
+
+    /// Whether the server stops.
+    pub fn is_stopping(&self) -> bool {
+        lock(&self.stops_at).is_some()
+    }
+
+    /// Whether the filter has had the time that it is given when the server stops.
+    pub fn is_late(&self) -> bool {
+        lock(&self.stops_at).is_some_and(|at| Instant::now() >= at)
     }
 
     /// Newest stamp.
@@ -56,6 +99,8 @@ pub struct Board {
     pub site: String,
     /// The maps.
     pub maps: ArcSwap<BTreeMap<String, Arc<MapView>>>,
+    /// Maps that could not be loaded, and why.
+    pub broken: Mutex<BTreeMap<String, Problem>>,
     /// The robots that were heard.
     pub robots: Mutex<BTreeMap<String, RobotState>>,
     /// What was last published on a key, for those who come later.
@@ -71,6 +116,7 @@ impl Board {
             keys,
             site: site.into(),
             maps: ArcSwap::default(),
+            broken: Mutex::default(),
             robots: Mutex::default(),
             latest: Mutex::default(),
             overrun: AtomicU64::new(0),

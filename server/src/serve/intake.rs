@@ -6,7 +6,8 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
-use toponym_proto::answer::{Ack, ErrorCode, Heard, HeardStatus, Problem, RobotState};
+use toponym_proto::answer::{Ack, ErrorCode, Problem, RobotState};
+use toponym_proto::codec::place_of;
 use toponym_proto::keys::{ANY_ROBOT, Input, check_key};
 use toponym_proto::{Keys, Message, Refused, Say};
 use tracing::{error, warn};
@@ -16,13 +17,20 @@ use super::maps::Maps;
 use super::outbox::Outbox;
 use super::robot::Robot;
 use crate::config::ServerConfig;
+use crate::fold::refused;
 
 /// How often streams are looked after when nothing arrives.
-const TICK: Duration = Duration::from_millis(10);
+const TICK: Duration = Duration::from_millis(2);
 /// Shortest time between two acks of a robot, and between two of its states.
 const REPORT_PERIOD: Duration = Duration::from_millis(50);
+/// The same of an ack as long as no more messages wait for one: a robot that is not in a hurry is not kept waiting.
+const ACK_PERIOD: Duration = Duration::from_millis(5);
+/// How long what has arrived may take into the journals when the server stops.
+const STOP_WAIT: Duration = Duration::from_secs(1);
 /// Messages taken before the streams are moved on.
 const BATCH: usize = 256;
+/// A robot that lives has no more messages on their way to disk.
+const FEW: u64 = 16;
 /// How long a sentence waits for a robot that was never heard: its guide may be faster.
 const ROBOT_WAIT: Duration = Duration::from_secs(2);
 /// Sentences that wait so.
@@ -103,6 +111,7 @@ struct WaitingSay {
 #[derive(Default)]
 struct Reported {
     at: Duration,
+    state_at: Duration,
     ack: Option<Ack>,
     state: Option<RobotState>,
 }
@@ -121,15 +130,18 @@ pub struct Intake {
 }
 
 impl Intake {
-    /// With no robots yet.
+    /// With the robots of the saved maps.
     pub fn new(config: ServerConfig, board: Arc<Board>, outbox: Outbox, maps: Maps) -> Self {
+        // A robot of an earlier run need not present itself again, and can be talked to before it comes.
+        let known = maps.saved_robots().map(|id| (id.to_owned(), Robot::new(id, &config, maps.saved(id))));
+        let robots = known.collect();
         Self {
             keys: board.keys.clone(),
             config,
             board,
             outbox,
             maps,
-            robots: BTreeMap::new(),
+            robots,
             reported: BTreeMap::new(),
             waiting: Vec::new(),
             started: Instant::now(),
@@ -156,15 +168,17 @@ impl Intake {
             }
             self.advance(false);
         }
-        // The maps' queues are bounded: each round hands over what has room.
-        while self.robots.values().any(|robot| !robot.is_settled() && robot.map().is_some()) {
+        // The maps' queues are bounded: each round hands over what has room. What is left then was not acknowledged.
+        let stops_at = Instant::now() + STOP_WAIT;
+        while self.robots.values().any(|robot| !robot.is_settled() && robot.map().is_some())
+            && Instant::now() < stops_at
+        {
             self.advance(true);
             std::thread::sleep(TICK);
         }
         self.advance(true);
-        let failed = self.maps.stop();
         self.report(true);
-        failed
+        self.maps.stop()
     }
 
     fn now(&self) -> Duration {
@@ -172,14 +186,15 @@ impl Intake {
     }
 
     fn take(&mut self, arrival: Arrival) {
-        let (key, result) = match arrival {
+        let (key, result, place) = match arrival {
             Arrival::Payload { key, encoding, bytes } => {
                 let message = self.read(&key, &encoding, &bytes);
-                (key, message)
+                let place = if message.is_err() { place_of(&encoding, &bytes) } else { None };
+                (key, message, place)
             }
             Arrival::TooLarge { key, bytes } => {
                 let max = self.config.limits.payload_bytes;
-                (key, Err(Refused::TooLarge { bytes, max }))
+                (key, Err(Refused::TooLarge { bytes, max }), None)
             }
             Arrival::Stop => return,
         };
@@ -193,7 +208,7 @@ impl Intake {
         match result {
             Ok(Message::Say(say)) => self.take_say(self.now(), robot, say),
             Ok(message) => self.take_message(&robot, &key, message),
-            Err(refused) => self.refuse(&robot, &key, &refused),
+            Err(refused) => self.refuse(&robot, &key, place, &refused),
         }
     }
 
@@ -247,7 +262,8 @@ impl Intake {
         robot.push(now, message);
     }
 
-    fn refuse(&mut self, robot: &str, key: &str, refused: &Refused) {
+    fn refuse(&mut self, robot: &str, key: &str, place: Option<(u64, u64)>, refused: &Refused) {
+        let now = self.now();
         warn!(key, "refused: {refused}");
         let problem = match refused {
             Refused::TooLarge { .. } => Problem::new(ErrorCode::TooLarge, refused.to_string()),
@@ -262,7 +278,7 @@ impl Intake {
         if robot != ANY_ROBOT
             && let Some(robot) = self.robot(robot)
         {
-            robot.refuse(problem);
+            robot.refuse(now, place, problem);
         }
     }
 
@@ -295,28 +311,16 @@ impl Intake {
             }
         };
         say.robot = Some(target.clone());
-        match self.robots.get_mut(&target) {
-            Some(mapping) if !mapping.is_deaf() => mapping.push_say(arrived, say),
-            _ => {
-                let problem = Problem::new(ErrorCode::Busy, "the map can't keep up: say it again later");
-                self.answer_say(&robot, &say.id, problem);
-            }
+        let said = self.robots.get_mut(&target).map_or(Ok(()), |mapping| mapping.push_say(say.clone()));
+        if let Err(problem) = said {
+            self.answer_say(&robot, &say.id, problem);
         }
     }
 
     /// Tells a guide that a sentence can't be used.
     fn answer_say(&self, robot: &str, id: &str, problem: Problem) {
         warn!(robot, id, "sentence refused: {problem}");
-        let heard = Heard {
-            id: id.into(),
-            status: HeardStatus::Refused,
-            durable: false,
-            parse: String::new(),
-            grounded: Vec::new(),
-            words: format!("I can't use that: {}.", problem.message),
-            question: None,
-            error: Some(problem),
-        };
+        let heard = refused(id, problem);
         self.outbox.tell(self.keys.heard(robot), &heard);
     }
 
@@ -332,22 +336,27 @@ impl Intake {
         self.report(finish);
     }
 
-    /// Publishes acks and states that changed, at most one each per period and robot.
+    /// Publishes acks and states that changed, not too often.
     fn report(&mut self, at_once: bool) {
         let now = self.now();
         for (id, robot) in &self.robots {
             let reported = self.reported.entry(id.clone()).or_default();
-            if !at_once && now.saturating_sub(reported.at) < REPORT_PERIOD {
+            let since = now.saturating_sub(reported.at);
+            if !at_once && since < ACK_PERIOD {
                 continue;
             }
-            reported.at = now;
             let ack = robot.ack();
-            if ack != reported.ack {
+            let period = if robot.in_flight() > FEW { REPORT_PERIOD } else { ACK_PERIOD };
+            if ack != reported.ack && (at_once || since >= period) {
                 if let Some(ack) = &ack {
                     self.outbox.send(self.keys.ack(id), ack);
                 }
-                reported.ack = ack;
+                (reported.ack, reported.at) = (ack, now);
             }
+            if !at_once && now.saturating_sub(reported.state_at) < REPORT_PERIOD {
+                continue;
+            }
+            reported.state_at = now;
             let state = robot.state();
             let known = reported.state.as_ref();
             // What is merely taken is told by the ack.

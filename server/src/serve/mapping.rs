@@ -1,28 +1,33 @@
-//! A map's own thread: messages in, one [`Mapper::step`] each, effects out. The only place where
-//! the filter runs.
+//! A map's own thread: entries of its journal in, effects out. The only place where the filter runs.
 
-use std::fs::File;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
+use toponym_core::Effect;
 use toponym_core::edge::EdgeKind;
 use toponym_core::effects::TrackState;
-use toponym_core::{Effect, Mapper};
-use toponym_proto::answer::{ANSWER_VERSION, Jump, MapIdentity, PoseOut};
-use toponym_proto::record::{RecordError, RecordWriter};
-use toponym_proto::{Mend, Message, Stamp};
+use toponym_journal::{Entry, Event};
+use toponym_proto::answer::{ANSWER_VERSION, Heard, Jump, MapIdentity, PoseOut};
+use toponym_proto::{Message, Stamp};
 use tracing::{debug, error, info, warn};
 
-use super::board::{Board, MapView, lock};
+use super::board::{Board, MapView};
 use super::outbox::Outbox;
+use super::recording::Recording;
+use super::saver::Saver;
+use super::scribe::{Reply, Step};
 use crate::convert;
-use crate::store::{Card, Store, StoreError};
+use crate::fold::{Fold, Outcome};
 
 /// How long recorded messages may wait to be made durable.
 const RECORD_SYNC: Duration = Duration::from_millis(200);
 /// Shortest time between two snapshots for queries: each copies what changes.
 const SNAPSHOT_PERIOD: Duration = Duration::from_millis(100);
+/// A checkpoint is due after so much of the filter's work: a restart does it again …
+const SAVE_WORK: Duration = Duration::from_secs(2);
+/// … and after so long in any case, if anything came.
+const SAVE_PERIOD: Duration = Duration::from_secs(60);
 
 /// Something to be done before long, but not too often.
 #[derive(Debug, Default)]
@@ -48,111 +53,153 @@ impl Due {
     }
 }
 
-/// What a map's thread is asked to do.
-pub enum Work {
-    /// Take in the next message of the map's stream.
-    Take(Message),
-    /// Mend what was said and tell what was done, or why not; and whether that is on disk.
-    Mend(Mend, SyncSender<Result<(String, bool), String>>),
-    /// Save the map and tell whether it went well.
-    Save(SyncSender<Result<(), String>>),
-    /// Save the map and end.
-    Stop,
-}
-
 /// A map with all that its thread needs.
 pub struct Mapping {
     pub(super) view: Arc<MapView>,
-    pub(super) mapper: Mapper,
-    pub(super) card: Card,
+    pub(super) fold: Fold,
+    /// Number of the last entry in it.
+    pub(super) index: u64,
     pub(super) board: Arc<Board>,
     pub(super) outbox: Outbox,
-    pub(super) store: Arc<Store>,
-    pub(super) record: Option<RecordWriter<File>>,
+    pub(super) saver: Saver,
+    pub(super) record: Option<Recording>,
     pub(super) graph_period: Duration,
+    pub(super) log_speech: bool,
+    /// Who waits for the map to be saved, and at which time of its journal it can be.
+    pub(super) saves: Vec<(Duration, Reply<()>)>,
     pub(super) record_due: Due,
     pub(super) snapshot_due: Due,
     pub(super) graph_due: Due,
 }
 
 impl Mapping {
-    /// Works until it is told to stop, then saves the map; tells whether it could.
-    pub fn run(mut self, work: &Receiver<Work>) -> Result<(), StoreError> {
+    /// Takes in what was on disk already, then works until it is told to stop or its time is over,
+    /// and saves the map; tells whether it could.
+    pub fn run(mut self, tail: Vec<(u64, Entry)>, steps: &Receiver<Step>) -> Result<(), String> {
+        self.recover(tail);
         loop {
-            let idle = match work.recv_timeout(SNAPSHOT_PERIOD) {
-                Ok(Work::Take(message)) => {
-                    self.take(message);
+            let idle = match steps.recv_timeout(SNAPSHOT_PERIOD) {
+                Ok(Step::Take(index, entry)) => {
+                    self.take(index, entry);
                     false
                 }
-                Ok(Work::Mend(mend, reply)) => {
-                    let done = self.mend(mend);
+                Ok(Step::Mend(index, entry, reply)) => {
+                    let done = self.mend(index, entry);
                     let _ = reply.send(done);
                     false
                 }
-                Ok(Work::Save(reply)) => {
-                    let _ = reply.send(self.save().map_err(|e| e.to_string()));
+                Ok(Step::Save(reply)) => {
+                    // What had arrived by then is to be in it.
+                    self.saves.push((self.fold.settles_at(), reply));
                     false
                 }
                 Err(RecvTimeoutError::Timeout) => true,
-                Ok(Work::Stop) | Err(RecvTimeoutError::Disconnected) => break,
+                Ok(Step::Stop) | Err(RecvTimeoutError::Disconnected) => break,
             };
-            if self.record_due.is_due(RECORD_SYNC, idle) {
-                self.sync_record();
+            if self.view.is_late() {
+                info!(map = self.view.id, "stops with work to do: it is in the journal, for the next start");
+                break;
             }
-            if self.snapshot_due.is_due(SNAPSHOT_PERIOD, idle) {
-                self.show();
-            }
-            if self.graph_due.is_due(self.graph_period, false) && !self.outbox.graph(&self.view) {
-                self.graph_due.mark();
-            }
+            self.do_what_is_due(idle);
         }
-        self.sync_record();
         self.show();
         self.save()?;
         info!(map = self.view.id, "saved");
         Ok(())
     }
 
+    /// Folds what the map took in after its last checkpoint. Who asked then asks again; only sentences are told, for
+    /// their guides wait.
+    fn recover(&mut self, tail: Vec<(u64, Entry)>) {
+        let (began, entries) = (Instant::now(), tail.len());
+        for (index, entry) in tail {
+            let Self { fold, record, outbox, view, board, .. } = &mut *self;
+            fold.take(entry, &mut |outcome| match outcome {
+                Outcome::Enters(message) => record.iter_mut().for_each(|r| r.write(message)),
+                Outcome::Heard(heard) => outbox.send(board.keys.heard(&view.robot), &heard),
+                Outcome::Effect(_) => {}
+            });
+            self.index = index;
+            if self.view.is_late() {
+                return;
+            }
+        }
+        if entries > 0 {
+            info!(map = self.view.id, entries, took_s = began.elapsed().as_secs_f64(), "recovered");
+            self.saver.worked(began.elapsed());
+            self.view.stamp_ns.store(self.fold.card.stamp_ns, Ordering::Relaxed);
+        }
+        self.view.held.store(self.fold.held(), Ordering::Relaxed);
+        self.show();
+    }
+
+    fn do_what_is_due(&mut self, idle: bool) {
+        let (held, now) = (self.fold.held(), self.fold.now());
+        let due = |(settles_at, _): &mut (Duration, Reply<()>)| held == 0 || now >= *settles_at;
+        let saves: Vec<_> = self.saves.extract_if(.., due).collect();
+        if !saves.is_empty() {
+            self.show();
+            let done = self.save();
+            for (_, reply) in saves {
+                let _ = reply.send(done.clone());
+            }
+        }
+        if self.record_due.is_due(RECORD_SYNC, idle) {
+            self.record.iter_mut().for_each(Recording::sync);
+        }
+        if self.snapshot_due.is_due(SNAPSHOT_PERIOD, idle) {
+            self.show();
+        }
+        if self.graph_due.is_due(self.graph_period, false) && !self.outbox.graph(&self.view) {
+            self.graph_due.mark();
+        }
+        if self.saver.is_due(self.index, SAVE_WORK, SAVE_PERIOD)
+            && let Err(e) = self.begin_save()
+        {
+            error!(map = self.view.id, "no checkpoint: {e}");
+        }
+    }
+
     /// Shows the posterior to those who ask.
     fn show(&mut self) {
-        self.view.snapshot.store(self.mapper.snapshot());
+        self.view.snapshot.store(self.fold.mapper.snapshot());
         self.graph_due.mark();
     }
 
-    /// An operator's command goes the way of all messages, so that a replay meets it too.
-    fn mend(&mut self, mend: Mend) -> Result<(String, bool), String> {
-        let effects = self.step(Message::Mend(mend));
-        self.show();
-        let durable = self.sync_record();
-        let done = effects.into_iter().find_map(|e| match e {
-            Effect::Mended(done) => Some(done),
-            _ => None,
+    /// An operator's command.
+    fn mend(&mut self, index: u64, entry: Entry) -> Result<String, String> {
+        let mut done = None;
+        self.index = index;
+        let record = &mut self.record;
+        self.fold.take(entry, &mut |outcome| match outcome {
+            Outcome::Enters(message) => record.iter_mut().for_each(|r| r.write(message)),
+            Outcome::Effect(Effect::Mended(words)) => done = Some(words),
+            Outcome::Effect(_) | Outcome::Heard(_) => {}
         });
-        done.unwrap_or_else(|| Err("nothing came of it".to_owned())).map(|words| (words, durable))
+        self.record_due.mark();
+        self.show();
+        done.unwrap_or_else(|| Err("nothing came of it".to_owned()))
     }
 
-    /// One message: into the record, through the filter.
-    fn step(&mut self, message: Message) -> Vec<Effect> {
-        if let Some(record) = &mut self.record {
-            match record.write(&message) {
-                Ok(()) => self.record_due.mark(),
-                Err(e) => self.end_record(&e),
-            }
-        }
-        if let Some(header) = message.header() {
-            self.card.watermark = Some((header.boot, header.seq));
-            self.card.stamp_ns = header.stamp.ns;
-            self.view.stamp_ns.store(header.stamp.ns, Ordering::Relaxed);
-        }
-        self.mapper.step(convert::event(message))
-    }
-
-    /// One message of the map's stream, and its effects out.
-    fn take(&mut self, message: Message) {
-        let effects = self.step(message);
-        let told =
-            |e: &Effect| matches!(e, Effect::Heard(_) | Effect::Jumped { .. } | Effect::StateChanged { .. });
-        if effects.iter().any(told) {
+    /// One entry, and its effects out.
+    fn take(&mut self, index: u64, entry: Entry) {
+        let began = Instant::now();
+        let bytes = bytes_of(&entry.event);
+        let (mut effects, mut heards) = (Vec::new(), Vec::new());
+        let record = &mut self.record;
+        self.fold.take(entry, &mut |outcome| match outcome {
+            Outcome::Enters(message) => record.iter_mut().for_each(|r| r.write(message)),
+            Outcome::Effect(effect) => effects.push(effect),
+            Outcome::Heard(heard) => heards.push(heard),
+        });
+        self.index = index;
+        self.record_due.mark();
+        self.view.stamp_ns.store(self.fold.card.stamp_ns, Ordering::Relaxed);
+        self.view.held.store(self.fold.held(), Ordering::Relaxed);
+        self.view.backlog_bytes.fetch_sub(bytes, Ordering::Relaxed);
+        self.saver.worked(began.elapsed());
+        let told = |e: &Effect| matches!(e, Effect::Jumped { .. } | Effect::StateChanged { .. });
+        if !heards.is_empty() || effects.iter().any(told) {
             // Who is told of it may ask at once.
             self.show();
         } else if !effects.is_empty() {
@@ -161,6 +208,19 @@ impl Mapping {
         for effect in effects {
             self.publish(effect);
         }
+        for heard in &heards {
+            self.tell(heard);
+        }
+    }
+
+    fn tell(&self, heard: &Heard) {
+        let map = &self.view.id;
+        if self.log_speech {
+            info!(map, id = heard.id, status = ?heard.status, parse = heard.parse, "heard: {}", heard.words);
+        } else {
+            info!(map, id = heard.id, status = ?heard.status, "heard");
+        }
+        self.outbox.send(self.board.keys.heard(&self.view.robot), heard);
     }
 
     fn publish(&mut self, effect: Effect) {
@@ -178,13 +238,6 @@ impl Mapping {
                     state: convert::pose_state(state),
                 };
                 self.outbox.stream(keys.pose(robot), &pose);
-            }
-            Effect::Heard(heard) => {
-                info!(map, id = heard.id, status = ?heard.status, "heard {:?}: {}", heard.text, heard.words);
-                let key = keys.heard(robot);
-                // Feedback promises what is on disk: make it so first.
-                let durable = self.sync_record();
-                self.outbox.send(key, &convert::heard(heard, durable));
             }
             Effect::Jumped { epoch, new_from_old } => {
                 info!(map, epoch, "coordinates jumped");
@@ -209,34 +262,37 @@ impl Mapping {
             Effect::SegmentBegan { stamp_ns, reason } => warn!(map, stamp_ns, "new segment: {reason}"),
             Effect::EdgeRefused { reason, .. } => debug!(map, "{reason}"),
             Effect::Mended(done) => info!(map, "mended: {done:?}"),
-            Effect::PlaceBegan { .. } | Effect::ScanPlaced { .. } | Effect::Weighed { .. } => {}
+            // What was heard is told by the fold.
+            Effect::Heard(_)
+            | Effect::PlaceBegan { .. }
+            | Effect::ScanPlaced { .. }
+            | Effect::Weighed { .. } => {}
         }
     }
 
-    /// Makes the record durable; false if there is none.
-    fn sync_record(&mut self) -> bool {
-        let Some(record) = &mut self.record else {
-            return false;
-        };
-        if let Err(e) = record.flush().and_then(|()| Ok(record.get_ref().sync_data()?)) {
-            self.end_record(&e);
-            return false;
+    /// A checkpoint, written by another thread; the record is there before it.
+    fn begin_save(&mut self) -> Result<(), String> {
+        self.record.iter_mut().for_each(Recording::sync);
+        self.saver.begin(&self.fold, self.index)
+    }
+
+    /// A checkpoint; when this returns it is durable.
+    fn save(&mut self) -> Result<(), String> {
+        self.begin_save()?;
+        self.saver.finish()
+    }
+}
+
+/// Bytes that something of a robot's or a guide's takes on its way to the filter.
+pub fn bytes_of(event: &Event) -> usize {
+    const HEAD: usize = 256;
+    match event {
+        Event::Message(Message::Scan(scan)) => HEAD + 4 * scan.ranges_m.len(),
+        Event::Message(_) | Event::Gap { .. } => HEAD,
+        Event::Say { say, .. } => {
+            HEAD + say.text.len() + say.alternatives.iter().map(|a| a.text.len()).sum::<usize>()
         }
-        *lock(&self.view.recorded) = self.card.watermark;
-        true
-    }
-
-    /// A record with a gap would replay another map: better none from here on.
-    fn end_record(&mut self, error: &RecordError) {
-        error!(map = self.view.id, "DATA LOSS: recording ends here: {error}");
-        self.record = None;
-    }
-
-    fn save(&mut self) -> Result<(), StoreError> {
-        let bytes = self
-            .mapper
-            .save()
-            .map_err(|e| StoreError::Broken { path: (&self.view.id).into(), reason: e.to_string() })?;
-        self.store.save(&self.view.id, &bytes, &self.card)
+        // The journal's own.
+        Event::Tick | Event::Hold(_) => 0,
     }
 }

@@ -2,28 +2,32 @@
 //! threads.
 
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io;
-use std::path::{Path, PathBuf};
-use std::sync::atomic::AtomicI64;
+use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
-use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use toponym_core::Mapper;
+use toponym_journal::{Entry, Event, Folder, Journal};
 use toponym_proto::Setup;
 use toponym_proto::answer::{ErrorCode, Problem};
-use toponym_proto::record::{RecordError, RecordWriter};
 use tracing::{error, info, warn};
 
-use super::board::{Board, MapView};
-use super::mapping::{Due, Mapping, Work};
+use super::board::{Board, MapView, lock};
+use super::mapping::{Due, Mapping};
 use super::outbox::Outbox;
+use super::recording::Recordings;
+use super::saver::Saver;
+use super::scribe::{Scribe, Work};
 use crate::config::ServerConfig;
-use crate::store::{Card, Store, StoreError};
+use crate::fold::{Card, Fold};
+use crate::store::{Found, Store, StoreError, identity};
 
-/// Messages that wait in front of the filter; those before them wait with their robot.
+/// Messages that wait in front of the journal; those before them wait with their robot.
 const QUEUE: usize = 256;
+/// Entries that wait between the journal and the filter: those of some seconds.
+const STEPS: usize = 1024;
+/// How long the filters may go on when the server stops; what they leave is in their journals.
+const STOP_WAIT: Duration = Duration::from_secs(3);
 
 /// The maps and their threads.
 pub struct Maps {
@@ -31,40 +35,76 @@ pub struct Maps {
     board: Arc<Board>,
     outbox: Outbox,
     store: Arc<Store>,
-    record: Option<Record>,
-    threads: Vec<JoinHandle<Result<(), StoreError>>>,
+    records: Option<Recordings>,
+    threads: Vec<JoinHandle<Result<(), String>>>,
     /// The saved map of each robot that it was on last, and (boot, seq) of the last message in it.
     saved: BTreeMap<String, (Arc<MapView>, (u64, u64))>,
 }
 
+/// A map to be started.
+struct Start {
+    fold: Fold,
+    tail: Vec<(u64, Entry)>,
+    journal: Journal<Folder>,
+}
+
 impl Maps {
-    /// None yet. `record`: of the first map; others get their id added to its name.
+    /// None yet.
     pub fn new(
         config: ServerConfig,
         board: Arc<Board>,
         outbox: Outbox,
         store: Arc<Store>,
-        record: Option<Record>,
+        records: Option<Recordings>,
     ) -> Self {
-        Self { config, board, outbox, store, record, threads: Vec::new(), saved: BTreeMap::new() }
+        Self { config, board, outbox, store, records, threads: Vec::new(), saved: BTreeMap::new() }
     }
 
-    /// Starts a thread for each saved map.
-    pub fn start_saved(&mut self, saved: BTreeMap<String, (Mapper, Card)>) -> io::Result<()> {
-        for (id, (mapper, card)) in saved {
-            info!(map = id, robot = card.robot, "loaded");
-            if self.record.is_some() {
-                warn!(map = id, "the record begins in the middle of this map: replay it with --start-map");
-            }
-            let (robot, watermark) = (card.robot.clone(), card.watermark);
-            let view = self.start(&id, mapper, card)?;
-            if let Some(watermark) = watermark
-                && self.saved.get(&robot).is_none_or(|(_, known)| *known < watermark)
-            {
-                self.saved.insert(robot, (view, watermark));
+    /// Starts a thread for each saved map. One that can't be loaded stops only itself.
+    pub fn start_saved(&mut self) -> Result<(), StoreError> {
+        for id in self.store.ids()? {
+            let loaded = self.store.load(&id, self.hold()).map_err(|e| e.to_string());
+            if let Err(why) = loaded.and_then(|found| self.go_on(&id, found)) {
+                error!(map = id, "this map is not served: {why}");
+                let problem = Problem::new(ErrorCode::Internal, format!("map {id:?} can't be loaded: {why}"))
+                    .field("map")
+                    .hint("see `toponym-server journal verify` and `recover`, or give the robot another map");
+                lock(&self.board.broken).insert(id, problem);
             }
         }
         Ok(())
+    }
+
+    fn hold(&self) -> Duration {
+        Duration::from_secs_f64(self.config.hold_back_s)
+    }
+
+    fn go_on(&mut self, id: &str, found: Found) -> Result<(), String> {
+        let Found { fold, tail, mut journal, mended } = found;
+        for what in &mended {
+            warn!(map = id, "mended: {what}");
+        }
+        let new = identity(&fold);
+        let old = journal.identity_mut();
+        if old.build != new.build {
+            warn!(map = id, "made by build {}; what follows its checkpoint is folded by this one", old.build);
+        }
+        *old = new;
+        let watermark = tail.iter().filter_map(|(_, entry)| entry.watermark()).max().max(fold.card.watermark);
+        info!(map = id, robot = fold.card.robot, entries = tail.len(), "loaded");
+        let robot = fold.card.robot.clone();
+        let view = self.start(id, Start { fold, tail, journal }, watermark).map_err(|e| e.to_string())?;
+        if let Some(watermark) = watermark
+            && self.saved.get(&robot).is_none_or(|(_, known)| *known < watermark)
+        {
+            self.saved.insert(robot, (view, watermark));
+        }
+        Ok(())
+    }
+
+    /// The robots that saved maps are of.
+    pub fn saved_robots(&self) -> impl Iterator<Item = &str> {
+        self.saved.keys().map(String::as_str)
     }
 
     /// The map that a robot was on in an earlier run, and how far it got.
@@ -75,6 +115,9 @@ impl Maps {
     /// The map that a robot's setup names, new if there is none. A map has one robot.
     pub fn find(&mut self, setup: &Setup) -> Result<Arc<MapView>, Problem> {
         let (id, robot) = (&setup.map, &setup.header.robot);
+        if let Some(problem) = lock(&self.board.broken).get(id) {
+            return Err(problem.clone());
+        }
         let maps = self.board.maps.load();
         if let Some(view) = maps.get(id) {
             if view.robot == *robot {
@@ -92,44 +135,58 @@ impl Maps {
                 .hint("raise maps_max in the server's configuration"));
         }
         let card = Card { uuid: new_uuid(), robot: robot.clone(), watermark: None, stamp_ns: 0 };
-        self.start(id, Mapper::new(self.config.mapper.clone()), card)
+        let fold = Fold::new(Mapper::new(self.config.mapper.clone()), card, self.hold());
+        let started = self.store.create(id, &fold).map_err(|e| e.to_string()).and_then(|journal| {
+            self.start(id, Start { fold, tail: Vec::new(), journal }, None).map_err(|e| e.to_string())
+        });
+        started
             .map_err(|e| Problem::new(ErrorCode::Internal, format!("map {id:?} could not be started: {e}")))
     }
 
-    fn start(&mut self, id: &str, mapper: Mapper, card: Card) -> io::Result<Arc<MapView>> {
-        let record = self.record.as_mut().map(|record| record.of_map(id)).transpose()?;
+    /// `durable`: (boot, seq) of the last of its robot's messages in its journal; the filter may not be that far.
+    fn start(&mut self, id: &str, map: Start, durable: Option<(u64, u64)>) -> std::io::Result<Arc<MapView>> {
+        let Start { fold, tail, journal } = map;
+        let record = self.records.as_ref();
+        let record = record.map(|r| r.of_map(id, &fold.card.uuid, fold.steps())).transpose()?;
         let (work, queue) = sync_channel(QUEUE);
-        let view = Arc::new(MapView {
-            id: id.into(),
-            uuid: card.uuid.clone(),
-            robot: card.robot.clone(),
-            snapshot: arc_swap::ArcSwap::new(mapper.snapshot()),
-            stamp_ns: AtomicI64::new(card.stamp_ns),
-            recorded: Mutex::default(),
-            work,
-        });
+        let (steps, taken) = sync_channel(STEPS);
+        let view = Arc::new(MapView::new(id, &fold.card, durable, fold.mapper.snapshot(), work));
+        let newest = tail.last().map_or(fold.now(), |(_, entry)| Duration::from_nanos(entry.at_ns));
+        // Settings may have changed since; what was taken in before is folded as it was.
+        let _ = view.work.try_send(Work::Take(Event::Hold(self.hold().as_nanos() as u64)));
+        let saved = journal.durable() - tail.len() as u64;
         let mapping = Mapping {
             view: view.clone(),
-            mapper,
-            card,
+            fold,
+            index: saved,
             board: self.board.clone(),
             outbox: self.outbox.clone(),
-            store: self.store.clone(),
+            saver: Saver::new(self.store.journal(id), saved),
             record,
             graph_period: Duration::from_secs_f64(self.config.graph_period_s),
+            log_speech: self.config.log_speech,
+            saves: Vec::new(),
             record_due: Due::default(),
             snapshot_due: Due::default(),
             graph_due: Due::default(),
         };
-        let thread = std::thread::Builder::new().name(format!("map {id}"));
-        self.threads.push(thread.spawn(move || mapping.run(&queue))?);
+        let scribe = Scribe::new(view.clone(), journal, steps, newest);
+        let named = |what: &str| std::thread::Builder::new().name(format!("{what} {id}"));
+        self.threads.push(named("map").spawn(move || mapping.run(tail, &taken))?);
+        self.threads.push(named("journal").spawn(move || {
+            scribe.run(&queue);
+            Ok(())
+        })?);
         self.board.add_map(view.clone());
         Ok(view)
     }
 
-    /// Lets every map work off its queue and save itself; returns when all have, with what became
-    /// of those that could not.
+    /// Lets every map's journal take what has come, and its filter work on for a while; returns when all are saved,
+    /// with what became of those that could not be.
     pub fn stop(&mut self) -> Vec<String> {
+        for view in self.board.maps.load().values() {
+            *lock(&view.stops_at) = Some(Instant::now() + STOP_WAIT);
+        }
         for view in self.board.maps.load().values() {
             let _ = view.work.send(Work::Stop);
         }
@@ -138,61 +195,15 @@ impl Maps {
             let name = thread.thread().name().unwrap_or_default().to_string();
             let why = match thread.join() {
                 Ok(Ok(())) => continue,
-                Ok(Err(e)) => format!("{name} could not be saved: {e}"),
-                Err(_) => format!("{name} is as last saved: its thread failed, see the log"),
+                Ok(Err(e)) => {
+                    format!("{name} could not be saved: {e}; its journal has all that was acknowledged")
+                }
+                Err(_) => format!("{name} failed, see the log; its journal has all that was acknowledged"),
             };
-            error!("DATA LOSS: {why}");
+            error!("{why}");
             failed.push(why);
         }
         failed
-    }
-}
-
-/// Where maps are recorded: the first under the name given, others with their id added.
-pub struct Record {
-    path: PathBuf,
-    /// For the first map, until there is one.
-    first: Option<RecordWriter<File>>,
-}
-
-impl Record {
-    /// Makes the file. One that is there already is an error: it may be all that is left of a map.
-    pub fn create(path: PathBuf) -> io::Result<Self> {
-        let first = Some(create_record(&path)?);
-        Ok(Self { path, first })
-    }
-
-    fn of_map(&mut self, id: &str) -> io::Result<RecordWriter<File>> {
-        if let Some(first) = self.first.take() {
-            return Ok(first);
-        }
-        let mut name = self.path.as_os_str().to_owned();
-        name.push(format!(".{id}"));
-        let path = Path::new(&name);
-        warn!(map = id, path = %path.display(), "a further map is recorded in a file of its own");
-        create_record(path)
-    }
-}
-
-fn create_record(path: &Path) -> io::Result<RecordWriter<File>> {
-    let named = |e: io::Error| {
-        let hint = match e.kind() {
-            io::ErrorKind::AlreadyExists => "; move the earlier record away or give --record another file",
-            _ => "",
-        };
-        io::Error::new(e.kind(), format!("record {}: {e}{hint}", path.display()))
-    };
-    let mut record =
-        File::create_new(path).and_then(|f| RecordWriter::new(f).map_err(into_io)).map_err(named)?;
-    // The first line is written at once: better told now than at the first scan.
-    record.flush().map_err(into_io).map_err(named)?;
-    Ok(record)
-}
-
-fn into_io(error: RecordError) -> io::Error {
-    match error {
-        RecordError::Io(e) => e,
-        other => io::Error::other(other),
     }
 }
 

@@ -1,11 +1,14 @@
 //! `serve`: robots and guides in, maps and answers out, over Zenoh.
 //!
 //! ```text
-//! zenoh callbacks ─ Door (bounded, never blocks) ─► Intake thread: decode, order, hold back
+//! zenoh callbacks ─ Door (bounded, never blocks) ─► Intake thread: decode, order
 //!                                                      │ bounded queue per map
 //!                                                      ▼
-//!                          Mapping thread per map: record, Mapper::step ─► Outbox thread ─► zenoh
-//!                                                      │ ArcSwap<Snapshot>
+//!                          Scribe thread per map: journal, sync ─► acknowledged
+//!                                                      │ bounded queue per map
+//!                                                      ▼
+//!                          Mapping thread per map: Fold, Mapper::step ─► Outbox thread ─► zenoh
+//!                                                      │ ArcSwap<Snapshot>        └─► Saver: checkpoints
 //!                                                      ▼
 //! zenoh queries ─► blocking tasks: answers from the Board, never from the filter
 //! ```
@@ -18,7 +21,10 @@ mod maps;
 mod network;
 mod outbox;
 pub mod queries;
+mod recording;
 mod robot;
+mod saver;
+pub mod scribe;
 
 pub use args::{LogFormat, ServeArgs, init_logging, run};
 pub use network::NetworkError;
@@ -27,8 +33,9 @@ use crate::config::{ConfigError, ServerConfig};
 use crate::store::{Store, StoreError};
 use board::Board;
 use intake::{Door, Intake};
-use maps::{Maps, Record};
+use maps::Maps;
 use outbox::Outbox;
+use recording::Recordings;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::thread::JoinHandle;
@@ -83,7 +90,7 @@ pub struct Server {
 }
 
 /// Serves until `shutdown` is ready; then takes in what has arrived, saves all maps and returns.
-/// `record`: file for the merged stream of messages; it must not exist yet.
+/// `record`: file for what enters the map; one that is there goes on.
 pub async fn serve(
     config: ServerConfig,
     record: Option<PathBuf>,
@@ -96,20 +103,19 @@ pub async fn serve(
 }
 
 impl Server {
-    /// Loads the saved maps and opens the network; when this returns, clients can connect.
+    /// Loads the saved maps and opens the network; when this returns, clients can connect. A map that was not saved
+    /// before the last stop takes in the rest of its journal meanwhile.
     pub async fn start(config: ServerConfig, record: Option<PathBuf>) -> Result<Self, ServeError> {
         config.check()?;
         let keys = Keys::new(&config.site).map_err(ConfigError::Invalid)?;
         let store = Arc::new(Store::open(&config.data)?);
-        let saved = store.load()?;
         let session = network::open(&config).await?;
         let endpoints = session.info().locators().await.iter().map(ToString::to_string).collect();
         let board = Arc::new(Board::new(keys.clone(), &config.site));
-        // After the network: a start that fails for a port in use leaves no record in the way of the next.
-        let record = record.map(Record::create).transpose()?;
+        let records = record.map(Recordings::new).transpose()?;
         let (outbox, publisher) = Outbox::start(board.clone(), session.clone())?;
-        let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, record);
-        maps.start_saved(saved)?;
+        let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, records);
+        maps.start_saved()?;
         let (door, arrivals) = Door::new(board.clone(), &config);
         let intake = Intake::new(config, board.clone(), outbox.clone(), maps);
         let intake =

@@ -15,7 +15,7 @@ use toponym_proto::selector::{self, Arguments};
 use toponym_proto::{Limits, Mend, Message};
 
 use super::board::{Board, MapView, lock};
-use super::mapping::Work;
+use super::scribe::Work;
 use crate::convert;
 
 /// How long a command waits for a map that is busy.
@@ -107,6 +107,9 @@ fn no_such_query(key: &str) -> Problem {
 }
 
 fn map(board: &Board, id: &str) -> Result<Arc<MapView>, Problem> {
+    if let Some(problem) = lock(&board.broken).get(id) {
+        return Err(problem.clone());
+    }
     let maps = board.maps.load();
     maps.get(id).cloned().ok_or_else(|| {
         let known: Vec<&str> = maps.keys().map(String::as_str).collect();
@@ -278,9 +281,9 @@ fn mend(board: &Board, command: &str, arguments: Arguments) -> Result<Vec<u8>, P
     let stopped = || Problem::new(ErrorCode::Internal, format!("map {:?} has stopped", map.id));
     map.work.send(Work::Mend(mend, reply)).map_err(|_| stopped())?;
     match done.recv_timeout(COMMAND_WAIT) {
-        Ok(Ok((words, durable))) => {
+        Ok(Ok(words)) => {
             let (query, map) = (command.to_owned(), map.id.clone());
-            json(&Mended { v: ANSWER_VERSION, query, map, words, durable })
+            json(&Mended { v: ANSWER_VERSION, query, map, words, durable: true })
         }
         Ok(Err(why)) => Err(Problem::new(ErrorCode::NothingToMend, why)),
         // Not `busy`, which is asked again: it may be done yet.

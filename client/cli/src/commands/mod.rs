@@ -89,6 +89,8 @@ enum Failure {
     Simulate(#[from] toponym_sim::args::SimulateError),
     #[error("DATA LOSS: the server gave up {0} messages; see its log")]
     Lost(u64),
+    #[error("{0} sentences without an answer: it is not known what became of them")]
+    Unheard(u64),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
 }
@@ -97,7 +99,7 @@ impl Failure {
     fn code(&self) -> u8 {
         match self {
             Self::Client(ClientError::NoServer { .. } | ClientError::Zenoh(_)) => exit::NO_SERVER,
-            Self::Client(ClientError::Timeout { .. }) => exit::TIMEOUT,
+            Self::Client(ClientError::Timeout { .. }) | Self::Unheard(_) => exit::TIMEOUT,
             Self::Client(ClientError::Refused(_) | ClientError::Unreadable { .. }) | Self::Lost(_) => {
                 exit::REFUSED
             }

@@ -38,8 +38,8 @@ pub struct ReplayArgs {
     /// Number of this start of the robot, must grow from replay to replay [default: Unix time].
     #[arg(long, value_name = "N")]
     boot: Option<u64>,
-    /// Longest time without any acknowledgement.
-    #[arg(long, value_name = "S", default_value = "60", value_parser = super::seconds)]
+    /// Longest time without any acknowledgement: a cut that is shorter is waited out.
+    #[arg(long, value_name = "S", default_value = "3600", value_parser = super::seconds)]
     timeout: Duration,
 }
 
@@ -73,10 +73,8 @@ pub async fn replay(endpoint: &str, site: &str, args: &ReplayArgs) -> Result<u8,
     log.notes().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let played = played?;
     println!("{}", summary(&played, boot, begin.elapsed()));
-    if played.heard < played.sentences {
-        eprintln!("warning: {} sentences without an answer", played.sentences - played.heard);
-    }
     match played.ack.map_or(0, |ack| ack.lost) {
+        0 if played.heard < played.sentences => Err(Failure::Unheard(played.sentences - played.heard)),
         0 => Ok(exit::FOUND),
         lost => Err(Failure::Lost(lost)),
     }
@@ -131,7 +129,7 @@ mod tests {
 
     #[test]
     fn the_summary_tells_the_watermark() {
-        let ack = Ack { v: 1, robot: "log".into(), boot: 7, seq: 41, durable: false, lost: 0 };
+        let ack = Ack { v: 1, robot: "log".into(), boot: 7, seq: 41, lost: 0 };
         let played = Replayed {
             messages: 42,
             last_seq: 41,

@@ -59,6 +59,8 @@ pub async fn say(endpoint: &str, site: &str, args: &SayArgs) -> Result<u8, Failu
     Ok(match heard.status {
         HeardStatus::Understood => exit::FOUND,
         HeardStatus::Asked | HeardStatus::NotUnderstood => exit::NOT_KNOWN,
+        // Not yet: `send` waits for more.
+        HeardStatus::Read => exit::TIMEOUT,
         HeardStatus::Refused => exit::REFUSED,
     })
 }
