@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::feedback::{
-    Ack, Counts, Done, Grounded, Heard, HeardStatus, Info, Jump, Mended, PoseOut, PoseState, RobotState,
+    Ack, Clocks, Counts, Done, Grounded, Heard, HeardStatus, Info, Jump, MapWork, Mended, PoseOut, PoseState,
+    RobotState,
 };
 
 /// `v` of every answer.

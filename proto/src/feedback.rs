@@ -117,10 +117,16 @@ pub struct RobotState {
     pub map: Option<String>,
     /// Boot of the newest message.
     pub boot: Option<u64>,
+    /// Newest stamp of that boot that has arrived.
+    #[serde(default)]
+    pub newest: Option<Stamp>,
     /// Since the server started.
     pub counts: Counts,
     /// The newest refusal.
     pub error: Option<Problem>,
+    /// Why the newest of the acknowledged messages that could not be used was not.
+    #[serde(default)]
+    pub unused: Option<String>,
 }
 
 /// Messages of a robot since the server started.
@@ -136,6 +142,9 @@ pub struct Counts {
     pub stale: u64,
     /// Never came, or came too late: data loss.
     pub lost: u64,
+    /// Acknowledged, but of no use to the map: see `unused`.
+    #[serde(default)]
+    pub unused: u64,
 }
 
 /// On `map/{map}/out/jump`: coordinates of the map changed, by more than 5 cm or 1° at the robot.
@@ -162,8 +171,40 @@ pub struct Info {
     pub maps: Vec<MapIdentity>,
     /// The robots that were heard.
     pub robots: Vec<RobotState>,
-    /// Messages dropped because the server could not keep up: data loss.
+    /// Messages dropped because the server could not keep up; robots and guides of the library send them again.
     pub overrun: u64,
+    /// How the maps' journals and filters do.
+    #[serde(default)]
+    pub work: Vec<MapWork>,
+    /// Maps that are not served, and why.
+    #[serde(default)]
+    pub broken: Vec<Problem>,
+}
+
+/// How a map's journal and filter do.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MapWork {
+    /// The map.
+    pub map: String,
+    /// Its robot.
+    pub robot: String,
+    /// Messages that are held back until time passes.
+    pub held: u64,
+    /// Bytes that are on their way to the filter.
+    pub backlog_bytes: u64,
+    /// Why the journal can't be written, as long as it can't.
+    pub trouble: Option<String>,
+}
+
+/// Answer of `time`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Clocks {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// The server's clock, since 1970.
+    pub now: Stamp,
+    /// Newest stamp that has arrived of each robot, on the robot's own clock: a sentence said now began then.
+    pub robots: std::collections::BTreeMap<String, Stamp>,
 }
 
 /// Answer of a command that succeeded.

@@ -131,6 +131,10 @@ impl Keys {
     pub fn info(&self) -> String {
         format!("{}/info", self.prefix)
     }
+    /// [`crate::answer::Clocks`]: what time it is, here and for each robot.
+    pub fn time(&self) -> String {
+        format!("{}/time", self.prefix)
+    }
     /// Liveliness token of a server.
     pub fn alive(&self, server: &str) -> String {
         format!("{}/alive/{server}", self.prefix)

@@ -27,6 +27,15 @@ pub enum Step {
     },
 }
 
+impl Step {
+    fn weight_bytes(&self) -> usize {
+        match self {
+            Self::Message(message) => message.weight_bytes(),
+            Self::Lost { .. } | Self::Refused { .. } => 0,
+        }
+    }
+}
+
 /// A robot that is known keeps no more in flight than a few thousand messages: a seq further ahead is a mistake, or forged,
 /// and waiting for all before it would shut the robot out.
 const AHEAD_MAX: u64 = 1 << 20;
@@ -68,6 +77,8 @@ pub struct Sequencer {
     early: BTreeMap<u64, (Duration, Step)>,
     /// In order, not yet taken.
     ready: VecDeque<Step>,
+    /// Bytes of what is held.
+    bytes: usize,
     dropped: Dropped,
 }
 
@@ -81,6 +92,7 @@ impl Sequencer {
             next: watermark.map_or(0, |(_, seq)| seq + 1),
             early: BTreeMap::new(),
             ready: VecDeque::new(),
+            bytes: 0,
             dropped: Dropped::default(),
         }
     }
@@ -121,6 +133,7 @@ impl Sequencer {
             self.dropped.absurd += 1;
             return;
         }
+        self.bytes += step.weight_bytes();
         self.early.insert(seq, (now, step));
         self.take_ready();
     }
@@ -130,7 +143,9 @@ impl Sequencer {
         if self.ready.is_empty() {
             self.give_up(now);
         }
-        self.ready.pop_front()
+        let step = self.ready.pop_front();
+        self.bytes -= step.as_ref().map_or(0, Step::weight_bytes);
+        step
     }
 
     /// What was dropped so far.
@@ -141,6 +156,11 @@ impl Sequencer {
     /// Messages that are held.
     pub fn len(&self) -> usize {
         self.early.len() + self.ready.len()
+    }
+
+    /// Bytes of them.
+    pub fn bytes(&self) -> usize {
+        self.bytes
     }
 
     /// Whether nothing is held.

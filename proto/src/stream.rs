@@ -149,6 +149,13 @@ pub struct Say {
     pub answers: Option<String>,
 }
 
+impl Say {
+    /// Bytes that it takes in memory, near enough to bound queues by.
+    pub fn weight_bytes(&self) -> usize {
+        256 + self.text.len() + self.alternatives.iter().map(|a| 64 + a.text.len()).sum::<usize>()
+    }
+}
+
 /// A recogniser's other guess.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -201,6 +208,17 @@ pub enum Message {
 }
 
 impl Message {
+    /// Bytes that it takes in memory, near enough to bound queues by.
+    pub fn weight_bytes(&self) -> usize {
+        const HEAD: usize = 256;
+        match self {
+            Self::Scan(scan) => HEAD + 4 * scan.ranges_m.len(),
+            Self::Setup(setup) => HEAD * (1 + setup.lasers.len()),
+            Self::Say(say) => say.weight_bytes(),
+            Self::Odom(_) | Self::End(_) | Self::Mend(_) => HEAD,
+        }
+    }
+
     /// The header of a robot's message; what people say and mend has none.
     pub fn header(&self) -> Option<&Header> {
         match self {

@@ -26,6 +26,8 @@ pub struct ServerConfig {
     pub gap_window: usize,
     /// Messages that may wait in memory, per robot and on the way in.
     pub queue_messages: usize,
+    /// Bytes of them on the way in, of all robots and guides.
+    pub queue_bytes: usize,
     /// Shortest time between two published graphs of a map.
     pub graph_period_s: f64,
     /// Robots that are kept account of.
@@ -51,6 +53,7 @@ impl Default for ServerConfig {
             join_wait_s: 15.0,
             gap_window: 1024,
             queue_messages: 20_000,
+            queue_bytes: 64 << 20,
             graph_period_s: 1.0,
             robots_max: 64,
             maps_max: 16,
@@ -116,6 +119,7 @@ impl ServerConfig {
         for (field, value) in [
             ("gap_window", self.gap_window),
             ("queue_messages", self.queue_messages),
+            ("queue_bytes", self.queue_bytes),
             ("robots_max", self.robots_max),
             ("maps_max", self.maps_max),
             ("mapper.particles", self.mapper.particles as usize),

@@ -3,7 +3,7 @@
 //! The shell round `toponym-core`: everything with a clock, a file, a thread or a network in it.
 //!
 //! - [`serve`]: the mapping server over Zenoh; [`config`]: its settings; [`fold`]: a map as a fold of its journal;
-//!   [`store`]: the journals.
+//!   [`store`]: the journals; [`journals`]: their command line.
 //! - [`map`]: recorded logs through the same core, offline; [`demo`]: all of it at once.
 //! - [`convert`]: between the wire's types and the core's.
 
@@ -11,6 +11,7 @@ pub mod config;
 pub mod convert;
 pub mod demo;
 pub mod fold;
+pub mod journals;
 pub mod map;
 pub mod serve;
 pub mod store;

@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use toponym_server::serve::args::{self, LogFormat, ServeArgs};
-use toponym_server::{demo, map};
+use toponym_server::{demo, journals, map};
 
 /// Particles make and drop many arrays of a few kilobytes, which the system's allocator scatters.
 #[global_allocator]
@@ -27,6 +27,7 @@ enum Command {
     Serve(ServeArgs),
     Map(Box<map::MapArgs>),
     Demo(demo::DemoArgs),
+    Journal(journals::JournalArgs),
 }
 
 fn main() -> ExitCode {
@@ -37,6 +38,7 @@ fn main() -> ExitCode {
             block_on(args::run(serve))
         }
         Command::Map(map) => map::run(&map),
+        Command::Journal(journal) => journals::run(&journal),
         Command::Demo(demo) => {
             demo::init_logging();
             block_on(demo::run(demo))

@@ -3,7 +3,7 @@
 use crate::site::{Folder, Site, drive, recorded, saved_map, say, settings};
 use toponym_core::Mapper;
 use toponym_proto::answer::{
-    ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, WhereReply,
+    Clocks, ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, WhereReply,
 };
 use toponym_proto::keys::Ask;
 use toponym_proto::{Header, Message};
@@ -186,5 +186,27 @@ async fn every_wrong_question_gets_an_error() {
         assert_eq!((problem.code, problem.field.as_deref()), (code, Some(field)), "{selector} {payload}");
         assert!(!problem.message.is_empty());
     }
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn the_time_is_told_here_and_on_each_robots_clock() {
+    let folder = Folder::new();
+    let site = mapped(&folder).await;
+    let reply = site.ask(&site.keys.time(), "").await.unwrap();
+    let clocks: Clocks = serde_json::from_value(reply).unwrap();
+    assert!(clocks.now.ns > 1_790_000_000_000_000_000);
+    assert_eq!(clocks.robots.get("r1"), Some(&crate::site::header("r1", 81).stamp));
+    site.stop().await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_key_that_would_take_for_ever_to_match_is_refused() {
+    let folder = Folder::new();
+    let site = mapped(&folder).await;
+    let chunk = "$*a".repeat(30) + "b";
+    let nasty = format!("toponym/v1/default/{chunk}");
+    assert_eq!(site.ask(&nasty, "").await.unwrap_err().code, ErrorCode::BadArgument);
+    site.ask(&site.keys.info(), "").await.unwrap();
     site.stop().await;
 }

@@ -25,7 +25,7 @@ const ROOMS: [&str; 17] = [
     "mapper",
 ];
 /// The same within `language`.
-const LANGUAGE: [&str; 17] = [
+const LANGUAGE: [&str; 18] = [
     "measure",
     "relation",
     "lexicon",
@@ -38,6 +38,7 @@ const LANGUAGE: [&str; 17] = [
     "grammar",
     "reader",
     "likeness",
+    "agreement",
     "understand",
     "phrases",
     "ellipsis",

@@ -1,10 +1,14 @@
 //! Command line of `serve`.
 
-use super::{ServeError, serve};
+use super::board::Board;
+use super::queries::save_all;
+use super::{ServeError, Server};
 use crate::config::ServerConfig;
 use clap::{Args, ValueEnum};
 use std::io::IsTerminal;
 use std::path::PathBuf;
+use std::sync::Arc;
+use tracing::{error, info};
 use tracing_subscriber::EnvFilter;
 
 /// Arguments of `serve`.
@@ -81,7 +85,36 @@ pub async fn run(args: ServeArgs) -> anyhow::Result<()> {
         return Ok(());
     }
     let shutdown = shutdown_signal()?;
-    Ok(serve(config, args.record, shutdown).await?)
+    let server = Server::start(config, args.record).await?;
+    let saving = save_on_hangup(server.board())?;
+    shutdown.await;
+    info!("stopping");
+    saving.abort();
+    Ok(server.stop().await?)
+}
+
+/// Saves all maps each time the process is told to (SIGHUP).
+#[cfg(unix)]
+fn save_on_hangup(board: Arc<Board>) -> std::io::Result<tokio::task::JoinHandle<()>> {
+    use tokio::signal::unix::{SignalKind, signal};
+    let mut hangup = signal(SignalKind::hangup())?;
+    Ok(tokio::spawn(async move {
+        while hangup.recv().await.is_some() {
+            let board = board.clone();
+            let saved = tokio::task::spawn_blocking(move || save_all(&board)).await;
+            match saved {
+                Ok(Ok(maps)) => info!(maps = maps.join(" "), "saved"),
+                Ok(Err(problem)) => error!("not saved: {problem}"),
+                Err(e) => error!("not saved: {e}"),
+            }
+        }
+    }))
+}
+
+/// Saves all maps each time the process is told to.
+#[cfg(not(unix))]
+fn save_on_hangup(_: Arc<Board>) -> std::io::Result<tokio::task::JoinHandle<()>> {
+    Ok(tokio::spawn(std::future::pending()))
 }
 
 /// Ready when the process is asked to end.

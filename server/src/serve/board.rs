@@ -37,6 +37,8 @@ pub struct MapView {
     pub backlog_bytes: AtomicUsize,
     /// Messages that are held back until time passes.
     pub held: AtomicUsize,
+    /// Scans that were of no use, and why the newest was not.
+    pub unused: Mutex<(u64, Option<String>)>,
     /// Why the journal can't be written, as long as it can't.
     pub trouble: Mutex<Option<String>>,
     /// By when the filter is to stop, once the server does.
@@ -69,6 +71,7 @@ impl MapView {
             durable: Mutex::new(durable),
             backlog_bytes: AtomicUsize::new(0),
             held: AtomicUsize::new(0),
+            unused: Mutex::default(),
             trouble: Mutex::default(),
             stops_at: Mutex::default(),
             work,
@@ -107,6 +110,8 @@ pub struct Board {
     pub latest: Mutex<BTreeMap<String, Vec<u8>>>,
     /// Messages dropped at the door because the server could not keep up.
     pub overrun: AtomicU64,
+    /// Bytes of messages that wait to be looked at.
+    pub queued_bytes: AtomicUsize,
 }
 
 impl Board {
@@ -120,6 +125,7 @@ impl Board {
             robots: Mutex::default(),
             latest: Mutex::default(),
             overrun: AtomicU64::new(0),
+            queued_bytes: AtomicUsize::new(0),
         }
     }
 

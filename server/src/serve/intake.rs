@@ -4,9 +4,9 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
 use std::time::{Duration, Instant};
-use toponym_proto::answer::{Ack, ErrorCode, Problem, RobotState};
+use toponym_proto::answer::{Ack, Counts, ErrorCode, Problem, RobotState};
 use toponym_proto::codec::place_of;
 use toponym_proto::keys::{ANY_ROBOT, Input, check_key};
 use toponym_proto::{Keys, Message, Refused, Say};
@@ -64,13 +64,15 @@ pub struct Door {
     queue: SyncSender<Arrival>,
     board: Arc<Board>,
     payload_max_bytes: usize,
+    queue_max_bytes: usize,
 }
 
 impl Door {
     /// With the queue behind it.
     pub fn new(board: Arc<Board>, config: &ServerConfig) -> (Self, Receiver<Arrival>) {
         let (queue, arrivals) = sync_channel(config.queue_messages);
-        (Self { queue, board, payload_max_bytes: config.limits.payload_bytes }, arrivals)
+        let payload_max_bytes = config.limits.payload_bytes;
+        (Self { queue, board, payload_max_bytes, queue_max_bytes: config.queue_bytes }, arrivals)
     }
 
     /// For Zenoh's callbacks.
@@ -79,18 +81,28 @@ impl Door {
             return;
         }
         let (key, bytes) = (sample.key_expr().to_string(), sample.payload().len());
+        let waiting = self.board.queued_bytes.fetch_add(bytes, Ordering::Relaxed);
+        if waiting + bytes > self.queue_max_bytes {
+            return self.overrun(bytes);
+        }
         let arrival = if bytes > self.payload_max_bytes {
             Arrival::TooLarge { key, bytes }
         } else {
             let encoding = sample.encoding().to_string();
             Arrival::Payload { key, encoding, bytes: sample.payload().to_bytes().into_owned() }
         };
-        if let Err(TrySendError::Full(_)) = self.queue.try_send(arrival) {
-            let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
-            // The first, and then each doubling: a flood must not flood the log.
-            if overrun.is_power_of_two() {
-                error!(overrun, "DATA LOSS: messages arrive faster than they can be looked at");
-            }
+        if self.queue.try_send(arrival).is_err() {
+            self.overrun(bytes);
+        }
+    }
+
+    /// There is no room: what is dropped was acknowledged to nobody.
+    fn overrun(&self, bytes: usize) {
+        self.board.queued_bytes.fetch_sub(bytes, Ordering::Relaxed);
+        let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
+        // The first, and then each doubling: a flood must not flood the log.
+        if overrun.is_power_of_two() {
+            error!(overrun, "messages arrive faster than they can be looked at: dropped, to be sent again");
         }
     }
 
@@ -126,6 +138,8 @@ pub struct Intake {
     robots: BTreeMap<String, Robot>,
     reported: BTreeMap<String, Reported>,
     waiting: Vec<WaitingSay>,
+    /// Messages on keys that mean nothing.
+    strange: u64,
     started: Instant,
 }
 
@@ -144,6 +158,7 @@ impl Intake {
             robots,
             reported: BTreeMap::new(),
             waiting: Vec::new(),
+            strange: 0,
             started: Instant::now(),
         }
     }
@@ -188,11 +203,13 @@ impl Intake {
     fn take(&mut self, arrival: Arrival) {
         let (key, result, place) = match arrival {
             Arrival::Payload { key, encoding, bytes } => {
+                self.board.queued_bytes.fetch_sub(bytes.len(), Ordering::Relaxed);
                 let message = self.read(&key, &encoding, &bytes);
                 let place = if message.is_err() { place_of(&encoding, &bytes) } else { None };
                 (key, message, place)
             }
             Arrival::TooLarge { key, bytes } => {
+                self.board.queued_bytes.fetch_sub(bytes, Ordering::Relaxed);
                 let max = self.config.limits.payload_bytes;
                 (key, Err(Refused::TooLarge { bytes, max }), None)
             }
@@ -201,7 +218,15 @@ impl Intake {
         let robot = match self.keys.input(&key) {
             Ok((robot, _)) => robot,
             Err(invalid) => {
-                warn!(key, "refused: {invalid}");
+                self.strange += 1;
+                if self.strange.is_power_of_two() {
+                    warn!(
+                        key = shown(&key),
+                        strange = self.strange,
+                        "refused: {}",
+                        shown(&invalid.to_string())
+                    );
+                }
                 return;
             }
         };
@@ -255,7 +280,7 @@ impl Intake {
         if robot.is_full() {
             let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
             if overrun.is_power_of_two() {
-                error!(key, overrun, "DATA LOSS: the map can't keep up, messages are dropped");
+                error!(key, overrun, "the map can't keep up: messages are dropped, to be sent again");
             }
             return;
         }
@@ -264,7 +289,11 @@ impl Intake {
 
     fn refuse(&mut self, robot: &str, key: &str, place: Option<(u64, u64)>, refused: &Refused) {
         let now = self.now();
-        warn!(key, "refused: {refused}");
+        let refusals = self.robots.get(robot).map_or(1, |r| r.state().counts.refused + 1);
+        // The first, and then each doubling.
+        if refusals.is_power_of_two() {
+            warn!(key = shown(key), refusals, "refused: {}", shown(&refused.to_string()));
+        }
         let problem = match refused {
             Refused::TooLarge { .. } => Problem::new(ErrorCode::TooLarge, refused.to_string()),
             Refused::Malformed(_) => Problem::new(ErrorCode::BadArgument, refused.to_string()),
@@ -319,7 +348,7 @@ impl Intake {
 
     /// Tells a guide that a sentence can't be used.
     fn answer_say(&self, robot: &str, id: &str, problem: Problem) {
-        warn!(robot, id, "sentence refused: {problem}");
+        warn!(robot, id = shown(id), "sentence refused: {}", shown(&problem.to_string()));
         let heard = refused(id, problem);
         self.outbox.tell(self.keys.heard(robot), &heard);
     }
@@ -361,7 +390,7 @@ impl Intake {
             let known = reported.state.as_ref();
             // What is merely taken is told by the ack.
             let news = known.is_none_or(|known| {
-                let counts = toponym_proto::answer::Counts { taken: known.counts.taken, ..state.counts };
+                let counts = Counts { taken: known.counts.taken, ..state.counts };
                 (&known.map, known.boot, &known.error) != (&state.map, state.boot, &state.error)
                     || known.counts != counts
             });
@@ -372,4 +401,9 @@ impl Intake {
             lock(&self.board.robots).insert(id.clone(), state);
         }
     }
+}
+
+/// A text from outside, for the log: not too long, and without control characters.
+fn shown(text: &str) -> String {
+    text.chars().take(200).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
 }

@@ -8,11 +8,11 @@ use toponym_core::Effect;
 use toponym_core::edge::EdgeKind;
 use toponym_core::effects::TrackState;
 use toponym_journal::{Entry, Event};
+use toponym_proto::Stamp;
 use toponym_proto::answer::{ANSWER_VERSION, Heard, Jump, MapIdentity, PoseOut};
-use toponym_proto::{Message, Stamp};
 use tracing::{debug, error, info, warn};
 
-use super::board::{Board, MapView};
+use super::board::{Board, MapView, lock};
 use super::outbox::Outbox;
 use super::recording::Recording;
 use super::saver::Saver;
@@ -255,7 +255,14 @@ impl Mapping {
                 warn!(map, stamp_ns, ?state, "{why}");
             }
             Effect::StateChanged { stamp_ns, state, why } => info!(map, stamp_ns, ?state, "{why}"),
-            Effect::ScanDropped { stamp_ns, reason } => warn!(map, stamp_ns, "scan dropped: {reason}"),
+            Effect::ScanDropped { stamp_ns, reason } => {
+                let unused = &mut *lock(&self.view.unused);
+                // Once each time it is another reason, and each doubling.
+                if unused.1.as_deref() != Some(reason.as_str()) || (unused.0 + 1).is_power_of_two() {
+                    warn!(map, stamp_ns, unused = unused.0 + 1, "scan not used: {reason}");
+                }
+                *unused = (unused.0 + 1, Some(reason));
+            }
             // Walking round a block brings hundreds of these; what words bring is rare.
             Effect::EdgeAccepted { kind: EdgeKind::Distance, reason, .. } => debug!(map, "{reason}"),
             Effect::EdgeAccepted { weight, reason, .. } => info!(map, weight, "{reason}"),
@@ -285,14 +292,10 @@ impl Mapping {
 
 /// Bytes that something of a robot's or a guide's takes on its way to the filter.
 pub fn bytes_of(event: &Event) -> usize {
-    const HEAD: usize = 256;
     match event {
-        Event::Message(Message::Scan(scan)) => HEAD + 4 * scan.ranges_m.len(),
-        Event::Message(_) | Event::Gap { .. } => HEAD,
-        Event::Say { say, .. } => {
-            HEAD + say.text.len() + say.alternatives.iter().map(|a| a.text.len()).sum::<usize>()
-        }
-        // The journal's own.
-        Event::Tick | Event::Hold(_) => 0,
+        Event::Message(message) => message.weight_bytes(),
+        Event::Say { say, .. } => say.weight_bytes(),
+        // Small, and the journal's own.
+        Event::Gap { .. } | Event::Tick | Event::Hold(_) => 0,
     }
 }

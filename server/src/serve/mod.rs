@@ -128,6 +128,11 @@ impl Server {
         Ok(server)
     }
 
+    /// What the outside may see.
+    pub fn board(&self) -> Arc<Board> {
+        self.board.clone()
+    }
+
     /// Where clients can connect.
     pub fn endpoints(&self) -> &[String] {
         &self.endpoints
@@ -195,6 +200,11 @@ fn reply_to(board: &Board, query: &Query) {
     let selected = query.key_expr();
     let payload = query.payload().map(|p| p.to_bytes()).unwrap_or_default();
     let parameters = query.parameters().as_str();
+    // Whether "$*a$*a$*a…" fits takes a time that grows with each "$*".
+    if selected.as_str().contains("$*") {
+        let problem = Problem::new(ErrorCode::BadArgument, "a key may have * and **, but not $*");
+        return reply_problem(query, problem.field("key"));
+    }
     let keys = if selected.is_wild() {
         let matching = |key: &String| {
             zenoh::key_expr::KeyExpr::try_from(key.as_str()).is_ok_and(|key| selected.intersects(&key))

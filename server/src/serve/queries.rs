@@ -3,16 +3,19 @@
 
 use serde::Serialize;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::sync_channel;
-use std::time::Duration;
+use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use toponym_core::answers::snapshot::asks_of_robot;
 use toponym_core::effects::TrackState;
 use toponym_core::{Answer, Query, Snapshot};
-use toponym_proto::answer::{ANSWER_VERSION, Done, ErrorCode, Info, Mended, Problem};
+use toponym_proto::answer::{
+    ANSWER_VERSION, Clocks, Done, ErrorCode, Info, MapWork, Mended, Problem, RobotState,
+};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
-use toponym_proto::{Limits, Mend, Message};
+use toponym_proto::{Limits, Mend, Message, Stamp};
 
 use super::board::{Board, MapView, lock};
 use super::scribe::Work;
@@ -26,7 +29,7 @@ const RESOLUTION_DEFAULT_M: f64 = 0.05;
 
 /// All keys there are something to ask on, for queries with wildcards.
 pub fn askable(board: &Board) -> Vec<String> {
-    let mut keys = vec![board.keys.info()];
+    let mut keys = vec![board.keys.info(), board.keys.time()];
     for map in board.maps.load().keys() {
         keys.extend(Ask::ALL.map(|ask| board.keys.ask(map, ask)));
         keys.push(board.keys.graph(map));
@@ -77,6 +80,7 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
     let arguments = selector::decode(parameters, payload)?;
     match board.keys.chunks(key).unwrap_or_default().as_slice() {
         ["info"] => info(board, &arguments),
+        ["time"] => time(board, arguments),
         ["do", "save"] => save(board, &arguments),
         ["do", command @ ("undo" | "rename" | "forget")] => mend(board, command, arguments),
         ["do", command] => {
@@ -228,17 +232,49 @@ fn info(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
         site: board.site.clone(),
         maps: board.maps.load().values().map(|map| map.identity(&map.snapshot.load())).collect(),
         robots: lock(&board.robots).values().cloned().collect(),
-        overrun: board.overrun.load(std::sync::atomic::Ordering::Relaxed),
+        overrun: board.overrun.load(Ordering::Relaxed),
+        work: board.maps.load().values().map(|map| work(map)).collect(),
+        broken: lock(&board.broken).values().cloned().collect(),
+    })
+}
+
+fn work(map: &MapView) -> MapWork {
+    MapWork {
+        map: map.id.clone(),
+        robot: map.robot.clone(),
+        held: map.held.load(Ordering::Relaxed) as u64,
+        backlog_bytes: map.backlog_bytes.load(Ordering::Relaxed) as u64,
+        trouble: lock(&map.trouble).clone(),
+    }
+}
+
+fn time(board: &Board, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+    let [] = take(arguments, [])?;
+    let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+    let newest = |(id, state): (&String, &RobotState)| Some((id.clone(), state.newest?));
+    json(&Clocks {
+        v: ANSWER_VERSION,
+        now: Stamp { ns: since_1970.as_nanos() as i64 },
+        robots: lock(&board.robots).iter().filter_map(newest).collect(),
     })
 }
 
 /// `do/save?map=…`, or all maps.
 fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
     let [id] = take(arguments.clone(), ["map"])?;
-    let maps: Vec<_> = match id {
-        Some(id) => vec![map(board, &id)?],
-        None => board.maps.load().values().cloned().collect(),
+    let maps = match id {
+        Some(id) => save_maps(vec![map(board, &id)?])?,
+        None => save_all(board)?,
     };
+    json(&Done { v: ANSWER_VERSION, query: "save".into(), maps })
+}
+
+/// Saves all maps and tells their ids.
+pub fn save_all(board: &Board) -> Result<Vec<String>, Problem> {
+    save_maps(board.maps.load().values().cloned().collect())
+}
+
+fn save_maps(maps: Vec<Arc<MapView>>) -> Result<Vec<String>, Problem> {
     let mut saved = Vec::new();
     for map in maps {
         let (reply, done) = sync_channel(1);
@@ -250,7 +286,7 @@ fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
             Err(_) => return Err(Problem::new(ErrorCode::Busy, format!("map {:?} is busy", map.id))),
         }
     }
-    json(&Done { v: ANSWER_VERSION, query: "save".into(), maps: saved })
+    Ok(saved)
 }
 
 /// `do/undo?id=…`, `do/rename?from=…;to=…`, `do/forget?name=…`, each with `map=…` where there are several.

@@ -22,6 +22,10 @@ pub type FindMap<'a> = dyn FnMut(&Setup) -> Result<Arc<MapView>, Problem> + 'a;
 /// Bytes on their way to a filter; what comes then waits with its robot, and is not acknowledged.
 const BACKLOG_MAX_BYTES: usize = 32 << 20;
 
+/// A sentence that began so long before or after all that has arrived of its robot is on another clock. A stream that is
+/// played fast may be minutes behind its sentences.
+const CLOCK_MAX_S: f64 = 900.0;
+
 /// State of one robot's streams.
 pub struct Robot {
     id: String,
@@ -32,7 +36,8 @@ pub struct Robot {
     map: Option<Arc<MapView>>,
     /// Newest boot.
     boot: Option<u64>,
-    /// Newest stamp of that boot that has arrived.
+    /// First and newest stamp of that boot that have arrived; the first is not known of a robot of an earlier run.
+    first: Option<Stamp>,
     newest: Option<Stamp>,
     /// (boot, seq) of the last message handed to the map, or given up.
     handed: Option<(u64, u64)>,
@@ -60,6 +65,7 @@ impl Robot {
             id: id.into(),
             sequencer: Sequencer::new(patience, watermark),
             parked: None,
+            first: None,
             newest: map.as_ref().map(|map| map.stamp()),
             map,
             boot: watermark.map(|w| w.0),
@@ -74,7 +80,7 @@ impl Robot {
 
     /// Whether no more of its streams fits in: the map can't keep up.
     pub fn is_full(&self) -> bool {
-        self.sequencer.len() >= self.queue_messages
+        self.sequencer.len() >= self.queue_messages || self.sequencer.bytes() >= BACKLOG_MAX_BYTES
     }
 
     /// Whether its streams go to a map.
@@ -87,8 +93,10 @@ impl Robot {
         if let Some(header) = message.header() {
             if Some(header.boot) > self.boot {
                 // What was wrong with an earlier start says nothing of this one.
-                (self.boot, self.no_map, self.refusal, self.newest) = (Some(header.boot), None, None, None);
+                (self.boot, self.no_map, self.refusal) = (Some(header.boot), None, None);
+                (self.first, self.newest) = (Some(header.stamp), None);
             }
+            self.notice_restart(&message);
             if Some(header.boot) == self.boot {
                 self.newest = self.newest.max(Some(header.stamp));
             }
@@ -96,12 +104,26 @@ impl Robot {
         self.sequencer.push(now, message);
     }
 
+    /// A setup with a number that was used before, but later than all that came, is no repetition: the robot has started
+    /// again under the same boot, and all that it sends looks old.
+    fn notice_restart(&mut self, message: &Message) {
+        let Message::Setup(Setup { header, .. }) = message else { return };
+        let is_used = self.handed.is_some_and(|(boot, seq)| boot == header.boot && header.seq <= seq);
+        if is_used && Some(header.stamp) > self.newest {
+            let message = format!("boot {} was used before: what has a used seq is dropped", header.boot);
+            error!(robot = self.id, "{message}");
+            let hint = "each start of a robot needs a larger boot, such as the Unix time in seconds";
+            self.refusal = Some(Problem::new(ErrorCode::BadArgument, message).field("boot").hint(hint));
+        }
+    }
+
     /// Hands a sentence to the map. One without `began` counts as said at the newest stamp that has arrived.
     ///
     /// # Errors
     /// If the map can't keep up, or has stopped.
     pub fn push_say(&mut self, mut say: Say) -> Result<(), Problem> {
-        say.began.get_or_insert(self.newest.unwrap_or_default());
+        let began = *say.began.get_or_insert(self.newest.unwrap_or_default());
+        self.check_clock(began)?;
         let boot = self.boot.unwrap_or_default();
         let stopped = || Problem::new(ErrorCode::Internal, "the map has stopped: see the server's log");
         let busy = || Problem::new(ErrorCode::Busy, "the map can't keep up: say it again later");
@@ -111,6 +133,22 @@ impl Robot {
             Err(TrySendError::Full(_)) => Err(busy()),
             Err(TrySendError::Disconnected(_)) => Err(stopped()),
         }
+    }
+
+    /// Whether a time can be one of this robot's clock.
+    fn check_clock(&self, began: Stamp) -> Result<(), Problem> {
+        let off_s = |from: Stamp, to: Stamp| to.seconds() - from.seconds();
+        let ahead_s = self.newest.map_or(0.0, |newest| off_s(newest, began));
+        let before_s = self.first.map_or(0.0, |first| off_s(began, first));
+        let (s, what) =
+            if ahead_s > before_s { (ahead_s, "after the newest") } else { (before_s, "before the first") };
+        if s <= CLOCK_MAX_S {
+            return Ok(());
+        }
+        let message = format!("began is {s:.0} s {what} stamp of the robot: it is on another clock");
+        Err(Problem::new(ErrorCode::BadArgument, message)
+            .field("began")
+            .hint("leave it out (then it was said now), or take the robot's time from the key time"))
     }
 
     /// Counts a refusal; the newest is told in the robot's state. `place`: (boot, seq), if that could be read.
@@ -246,6 +284,7 @@ impl Robot {
     /// What is told on `out/state`.
     pub fn state(&self) -> RobotState {
         let dropped = self.sequencer.dropped();
+        let unused = self.map.as_ref().map(|map| lock(&map.unused).clone()).unwrap_or_default();
         let trouble = self.map.as_ref().and_then(|map| lock(&map.trouble).clone()).map(|why| {
             Problem::new(ErrorCode::Internal, format!("the journal can't be written: {why}"))
                 .hint("nothing is taken in until it can; free some space, or mend the disk")
@@ -255,10 +294,13 @@ impl Robot {
             robot: self.id.clone(),
             map: self.map.as_ref().map(|map| map.id.clone()),
             boot: self.boot,
+            newest: self.newest,
+            unused: unused.1,
             counts: Counts {
                 repeated: dropped.repeated,
                 stale: dropped.stale,
                 refused: self.counts.refused + dropped.absurd,
+                unused: unused.0,
                 ..self.counts
             },
             error: trouble.or_else(|| self.no_map.clone()).or_else(|| self.refusal.clone()),

@@ -3,6 +3,7 @@
 mod find;
 mod mend;
 mod play;
+mod status;
 mod talk;
 
 use clap::{Parser, Subcommand};
@@ -71,6 +72,8 @@ enum Command {
     Rename(mend::RenameArgs),
     /// Forget a name.
     Forget(mend::ForgetArgs),
+    /// How does the server do?
+    Status(status::StatusArgs),
     /// Play a recorded log to the server, as robot and guide.
     Replay(play::ReplayArgs),
     Simulate(SimulateArgs),
@@ -122,6 +125,7 @@ pub async fn run(args: Args) -> ExitCode {
         Command::Undo(undo) => mend::undo(&endpoint, &args.site, undo).await,
         Command::Rename(rename) => mend::rename(&endpoint, &args.site, rename).await,
         Command::Forget(forget) => mend::forget(&endpoint, &args.site, forget).await,
+        Command::Status(asked) => status::status(&endpoint, &args.site, asked).await,
         Command::Replay(replay) => play::replay(&endpoint, &args.site, replay).await,
         Command::Simulate(simulate) => simulated(simulate),
     };

@@ -106,7 +106,7 @@ fn spot(l: &Locate) -> (Relation, &[Phrase]) {
 /// Whether phrases may mean one: pointers do alike, names with all words of one in the other.
 fn one(a: &Phrase, b: &Phrase) -> bool {
     let (Head::Named(head_a), Head::Named(head_b)) = (&a.head, &b.head) else { return a.head == b.head };
-    let words = |p: &Phrase, head: &crate::language::Name| {
+    let words = |p: &Phrase, head: &crate::language::lexicon::names::Name| {
         let label = p.label().unwrap_or_else(|| head.clone());
         label.as_str().split(' ').map(|w| w.trim_end_matches("'s").to_owned()).collect::<Vec<_>>()
     };

@@ -136,3 +136,51 @@ fn a_robot_whose_map_has_stopped_gets_another() {
     robot.advance(later * 2, false, &mut find);
     assert_eq!(robot.ack().map(|ack| ack.seq), Some(3));
 }
+
+#[test]
+fn a_sentence_of_another_clock_is_refused() {
+    let (view, _queue) = map("main");
+    let mut robot = robot();
+    let at = |seq: u64, s: i64| Header { stamp: Stamp { ns: s * 1_000_000_000 }, ..header(seq) };
+    let start = Setup { header: at(0, 5_000), map: "main".into(), lasers: vec![] };
+    robot.push(START, Message::Setup(start));
+    robot.push(START, Message::Odom(Odom { header: at(1, 5_100), odom_from_body: Pose::default() }));
+    robot.advance(START, false, &mut |_| Ok(view.clone()));
+    let say = |s: i64| {
+        let began = Some(Stamp { ns: s * 1_000_000_000 });
+        Say { id: "s".into(), text: "this is the gym".into(), began, ..Say::default() }
+    };
+    for (s, words) in [(1_790_000_000, "after the newest"), (100, "before the first")] {
+        let problem = robot.push_say(say(s)).unwrap_err();
+        assert!(problem.message.contains(words) && problem.field.as_deref() == Some("began"), "{problem}");
+    }
+    for s in [5_000, 5_101, 4_990] {
+        robot.push_say(say(s)).unwrap();
+    }
+}
+
+#[test]
+fn a_robot_that_starts_again_under_the_same_boot_is_told_so() {
+    let (view, queue) = map("main");
+    let mut robot = robot();
+    let setup_at = |ns| {
+        Message::Setup(Setup {
+            header: Header { stamp: Stamp { ns }, ..header(0) },
+            map: "main".into(),
+            lasers: vec![],
+        })
+    };
+    robot.push(START, setup_at(10));
+    robot.push(START, odom(1));
+    robot.advance(START, false, &mut |_| Ok(view.clone()));
+    write_down(&view, &queue);
+    // The same again is a repetition.
+    robot.push(START, setup_at(10));
+    assert_eq!(robot.state().error, None);
+    robot.push(START, setup_at(2_000));
+    let error = robot.state().error.unwrap();
+    assert!(
+        error.message.contains("boot 1 was used before") && error.field.as_deref() == Some("boot"),
+        "{error}"
+    );
+}

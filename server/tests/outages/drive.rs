@@ -1,36 +1,42 @@
-//! `kill -9` of the real server, again and again, while a robot drives and a guide talks: nothing that was acknowledged
-//! is lost, nothing counts twice, and robot and guide go on by themselves.
-//!
-//! `TOPONYM_KILLS` sets how often (3), `TOPONYM_SEED` when.
+//! A robot that drives and a guide that talks, whatever happens to their server; and the server.
 
-#![allow(clippy::unwrap_used)]
-
-use rand::{RngExt as _, SeedableRng as _};
-use rand_chacha::ChaCha8Rng;
 use std::net::TcpListener;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use toponym::{Guide, Planner, Robot, RobotConfig};
 use toponym_proto::record::RecordReader;
 use toponym_proto::{Clock, Header, Laser, Message, Odom, Pose, Scan, Setup, Stamp};
 
 /// Nothing here takes that long unless it has failed.
-const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(120);
 /// From message to message.
 const PERIOD: Duration = Duration::from_millis(2);
 /// A sentence after so many messages.
 const SENTENCE_EACH: u64 = 40;
 
-/// A server of its own, killed when dropped.
-struct Server {
+/// A server in a process and a folder of its own, both gone when dropped.
+pub struct Server {
     child: Child,
-    began: Instant,
+    pub began: Instant,
+    pub folder: PathBuf,
+    pub endpoint: String,
 }
 
 impl Server {
-    fn start(folder: &Path, endpoint: &str) -> Self {
-        let child = Command::new(env!("CARGO_BIN_EXE_toponym-server"))
+    pub fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let name = format!("toponym-outage-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let folder = std::env::temp_dir().join(name);
+        std::fs::create_dir_all(&folder).unwrap();
+        let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let endpoint = format!("tcp/127.0.0.1:{port}");
+        Self { child: Self::start(&folder, &endpoint), began: Instant::now(), folder, endpoint }
+    }
+
+    fn start(folder: &Path, endpoint: &str) -> Child {
+        Command::new(env!("CARGO_BIN_EXE_toponym-server"))
             .args(["serve", "--listen", endpoint, "--data"])
             .arg(folder.join("data"))
             .arg("--record")
@@ -38,20 +44,43 @@ impl Server {
             .env("RUST_LOG", "error")
             .stdout(Stdio::null())
             .spawn()
-            .unwrap();
-        Self { child, began: Instant::now() }
+            .unwrap()
+    }
+
+    /// kill -9.
+    pub fn end(&mut self) {
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+
+    /// kill -9, and another start.
+    pub fn restart(&mut self) {
+        self.end();
+        (self.child, self.began) = (Self::start(&self.folder, &self.endpoint), Instant::now());
+    }
+
+    /// Sends a signal, such as "TERM".
+    #[cfg(unix)]
+    pub fn signal(&self, name: &str) {
+        let signalled = Command::new("kill").args(["-s", name, &self.child.id().to_string()]).status();
+        assert!(signalled.unwrap().success());
+    }
+
+    /// Waits until it has ended by itself; tells whether it says that all went well.
+    pub fn ended(&mut self) -> bool {
+        self.child.wait().unwrap().success()
     }
 }
 
 impl Drop for Server {
     fn drop(&mut self) {
-        let _ = self.child.kill();
-        let _ = self.child.wait();
+        self.end();
+        let _ = std::fs::remove_dir_all(&self.folder);
     }
 }
 
 /// How often, and when.
-fn setting(name: &str, default: u64) -> u64 {
+pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().map_or(default, |text| text.parse().unwrap())
 }
 
@@ -93,18 +122,61 @@ fn message(n: u64) -> Message {
     })
 }
 
-struct Drive {
-    robot: Robot,
+/// The robot and its guide.
+pub struct Drive {
+    session: zenoh::Session,
+    pub robot: Robot,
     guide: Guide,
-    sent: u64,
-    said: u64,
+    pub sent: u64,
+    pub said: u64,
     /// The highest watermark that was ever told.
-    acked: u64,
+    pub acked: u64,
 }
 
 impl Drive {
+    /// Connects to a server, once it listens there.
+    pub async fn begin(endpoint: &str) -> Self {
+        let session = connected(endpoint).await;
+        let config = RobotConfig { clock: Clock::Log, boot: 1, ..RobotConfig::new("r1") };
+        Self {
+            robot: Robot::connect(&session, config).await.unwrap(),
+            guide: Guide::connect(&session, "default", Some("r1")).await.unwrap(),
+            session,
+            sent: 0,
+            said: 0,
+            acked: 0,
+        }
+    }
+
+    /// Nothing is lost and nothing counts twice, in the map nor in the server's record.
+    pub async fn check(mut self, server: &Server) {
+        self.settle().await;
+        let planner = Planner::new(&self.session, "default", "main", PATIENCE).unwrap();
+        planner.save().await.unwrap();
+        let told: u64 = planner.labels().await.unwrap().labels.iter().map(|l| l.utterances).sum();
+        assert_eq!(told, self.said, "sentences in the map, and said");
+        check_record(&server.folder.join("run.rec"), &self);
+    }
+
+    /// Until something more is acknowledged.
+    pub async fn until_taken(&mut self, what: &str) {
+        let (before, deadline) = (self.acked, Instant::now() + PATIENCE);
+        while self.acked == before {
+            assert!(Instant::now() < deadline, "the robot is not taken again after {what}");
+            self.go().await;
+        }
+    }
+
+    /// For some time.
+    pub async fn go_for(&mut self, time: Duration) {
+        let began = Instant::now();
+        while began.elapsed() < time {
+            self.go().await;
+        }
+    }
+
     /// Sends the next message, and a sentence now and then.
-    async fn go(&mut self) {
+    pub async fn go(&mut self) {
         let next = if self.sent == 0 { setup() } else { message(self.sent) };
         self.robot.send(next).await.unwrap();
         self.sent += 1;
@@ -122,6 +194,7 @@ impl Drive {
         tokio::time::sleep(PERIOD).await;
     }
 
+    /// All is acknowledged, and heard.
     async fn settle(&mut self) {
         self.robot.settle().await.unwrap();
         let deadline = Instant::now() + PATIENCE;
@@ -132,60 +205,8 @@ impl Drive {
     }
 }
 
-#[tokio::test(flavor = "multi_thread")]
-async fn what_was_acknowledged_survives_kill_9() {
-    let (kills, seed) = (setting("TOPONYM_KILLS", 3), setting("TOPONYM_SEED", 1));
-    let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let folder = std::env::temp_dir().join(format!("toponym-kill-{}", std::process::id()));
-    std::fs::create_dir_all(&folder).unwrap();
-    let port = TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
-    let endpoint = format!("tcp/127.0.0.1:{port}");
-    let mut server = Server::start(&folder, &endpoint);
-    let session = connected(&endpoint).await;
-    let config = RobotConfig { clock: Clock::Log, boot: 1, ..RobotConfig::new("r1") };
-    let mut drive = Drive {
-        robot: Robot::connect(&session, config).await.unwrap(),
-        guide: Guide::connect(&session, "default", Some("r1")).await.unwrap(),
-        sent: 0,
-        said: 0,
-        acked: 0,
-    };
-    let mut progressed = 0;
-    for kill in 0..kills {
-        let after = Duration::from_millis(random.random_range(0..1500));
-        let before = drive.acked;
-        while server.began.elapsed() < after {
-            drive.go().await;
-        }
-        drop(server);
-        server = Server::start(&folder, &endpoint);
-        progressed += u64::from(drive.acked > before);
-        // Every other time the robot has to be taken again before the next kill.
-        if kill % 2 == 1 {
-            let before = drive.acked;
-            let deadline = Instant::now() + PATIENCE;
-            while drive.acked == before {
-                assert!(
-                    Instant::now() < deadline,
-                    "the robot is not taken again after kill {kill}, seed {seed}"
-                );
-                drive.go().await;
-            }
-        }
-    }
-    drive.settle().await;
-    let planner = Planner::new(&session, "default", "main", PATIENCE).unwrap();
-    planner.save().await.unwrap();
-    let told: u64 = planner.labels().await.unwrap().labels.iter().map(|l| l.utterances).sum();
-    assert_eq!(told, drive.said, "sentences in the map, and said");
-    drop(server);
-    check_record(&folder.join("run.rec"), &drive);
-    println!("{kills} kills, {progressed} with progress: {} messages, {} sentences", drive.sent, drive.said);
-    std::fs::remove_dir_all(folder).unwrap();
-}
-
 /// A session, once the server listens.
-async fn connected(endpoint: &str) -> zenoh::Session {
+pub async fn connected(endpoint: &str) -> zenoh::Session {
     let deadline = Instant::now() + PATIENCE;
     loop {
         match toponym::open(endpoint).await {

@@ -1,0 +1,127 @@
+//! A network that is cut, stalls, and comes back: nothing is lost.
+//!
+//! `TOPONYM_CUT_S` sets how long it is away (2).
+
+use crate::drive::{Drive, Server, setting};
+use std::net::SocketAddr;
+use std::time::Duration;
+use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
+use tokio::net::{TcpListener, TcpStream};
+use tokio::sync::watch;
+
+/// What becomes of what is sent.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Line {
+    /// It arrives.
+    Open,
+    /// It waits: neither side is told.
+    Stalled,
+    /// Connections end, and new ones are refused.
+    Cut,
+}
+
+/// A line between robot and server.
+struct Proxy {
+    line: watch::Sender<Line>,
+    endpoint: String,
+}
+
+impl Proxy {
+    async fn to(server: &str) -> Self {
+        let server: SocketAddr = server.strip_prefix("tcp/").unwrap().parse().unwrap();
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let endpoint = format!("tcp/{}", listener.local_addr().unwrap());
+        let (line, state) = watch::channel(Line::Open);
+        tokio::spawn(async move {
+            while let Ok((client, _)) = listener.accept().await {
+                if *state.borrow() != Line::Cut
+                    && let Ok(server) = TcpStream::connect(server).await
+                {
+                    let (from, to) = (client.into_split(), server.into_split());
+                    tokio::spawn(carry(from.0, to.1, state.clone()));
+                    tokio::spawn(carry(to.0, from.1, state.clone()));
+                }
+            }
+        });
+        Self { line, endpoint }
+    }
+}
+
+/// Carries bytes one way, as the line is.
+async fn carry(
+    mut from: tokio::net::tcp::OwnedReadHalf,
+    mut to: tokio::net::tcp::OwnedWriteHalf,
+    mut line: watch::Receiver<Line>,
+) {
+    let mut bytes = vec![0; 1 << 14];
+    loop {
+        let state = *line.borrow_and_update();
+        let read = match state {
+            Line::Cut => return,
+            Line::Stalled => {
+                if line.changed().await.is_err() {
+                    return;
+                }
+                continue;
+            }
+            Line::Open => tokio::select! {
+                read = from.read(&mut bytes) => read,
+                changed = line.changed() => if changed.is_ok() { continue } else { return },
+            },
+        };
+        match read {
+            Ok(count @ 1..) if to.write_all(&bytes[..count]).await.is_ok() => {}
+            _ => return,
+        }
+    }
+}
+
+fn away() -> Duration {
+    Duration::from_secs(setting("TOPONYM_CUT_S", 2))
+}
+
+/// Robot and guide go on while the line does this, one after the other.
+async fn nothing_is_lost(scene: &[(Line, Duration)]) {
+    let server = Server::new();
+    // The server listens before anybody is let through.
+    drop(crate::drive::connected(&server.endpoint).await);
+    let proxy = Proxy::to(&server.endpoint).await;
+    let mut drive = Drive::begin(&proxy.endpoint).await;
+    drive.go_for(Duration::from_millis(500)).await;
+    let (line, scene) = (proxy.line.clone(), scene.to_vec());
+    let scene = tokio::spawn(async move {
+        for (state, time) in scene {
+            line.send_replace(state);
+            tokio::time::sleep(time).await;
+        }
+        line.send_replace(Line::Open);
+    });
+    // The robot waits while too much is in flight.
+    while !scene.is_finished() {
+        drive.go().await;
+    }
+    drive.until_taken("a cut").await;
+    drive.check(&server).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_cut_loses_nothing() {
+    nothing_is_lost(&[(Line::Cut, away())]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn cuts_in_a_row_lose_nothing() {
+    let (cut, open) = ((Line::Cut, Duration::from_millis(300)), (Line::Open, Duration::from_millis(400)));
+    nothing_is_lost(&[cut, open, cut, open, cut, open, cut]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_stall_loses_nothing() {
+    nothing_is_lost(&[(Line::Stalled, away())]).await;
+}
+
+/// Longer than Zenoh's lease of 10 s: both sides give the connection up, at different times.
+#[tokio::test(flavor = "multi_thread")]
+async fn a_half_open_connection_loses_nothing() {
+    nothing_is_lost(&[(Line::Stalled, Duration::from_secs(12))]).await;
+}
