@@ -83,6 +83,9 @@ impl Store {
     /// Makes the folder if there is none, and takes hold of it.
     pub fn open(folder: &Path) -> Result<Self, StoreError> {
         fs::create_dir_all(folder).map_err(io_error(folder))?;
+        if let Some(parent) = folder.canonicalize().map_err(io_error(folder))?.parent() {
+            sync_folder(parent).map_err(io_error(parent))?;
+        }
         let path = folder.join("lock");
         let lock = File::create(&path).map_err(io_error(&path))?;
         match lock.try_lock() {
@@ -97,13 +100,14 @@ impl Store {
         Folder(self.folder.join(id))
     }
 
-    /// Ids of all maps there are.
+    /// Ids of all maps there are. A start that was cut short may have left a folder with nothing in it: that is none.
     pub fn ids(&self) -> Result<Vec<String>, StoreError> {
         let mut ids = Vec::new();
         for entry in fs::read_dir(&self.folder).map_err(io_error(&self.folder))? {
             let path = entry.map_err(io_error(&self.folder))?.path();
             let name = if path.is_dir() { path.file_name() } else { path.file_stem() };
-            let is_map = path.is_dir() || path.extension().is_some_and(|e| e == "map");
+            let is_map =
+                if path.is_dir() { is_begun(&path) } else { path.extension().is_some_and(|e| e == "map") };
             match name.and_then(|name| name.to_str()) {
                 Some(id) if is_map && check_id("map", id).is_ok() => ids.push(id.to_owned()),
                 _ => {}
@@ -117,7 +121,7 @@ impl Store {
     /// Reads a map. `hold`: how long the stream of one of an earlier build waits for sentences.
     pub fn load(&self, id: &str, hold: Duration) -> Result<Found, StoreError> {
         let disk = self.journal(id);
-        if !disk.0.is_dir() || has_no_files(&disk.0) {
+        if !is_begun(&disk.0) {
             self.import(id, hold)?;
         }
         let path = disk.0.clone();
@@ -157,12 +161,12 @@ impl Store {
     }
 }
 
-/// Whether a folder is there, but a start that was cut short left nothing in it.
-fn has_no_files(folder: &Path) -> bool {
-    let is_file = |entry: io::Result<fs::DirEntry>| {
+/// Whether a folder has a journal in it, however damaged.
+fn is_begun(folder: &Path) -> bool {
+    let is_its = |entry: io::Result<fs::DirEntry>| {
         entry.is_ok_and(|entry| !entry.file_name().to_string_lossy().starts_with("new."))
     };
-    !fs::read_dir(folder).is_ok_and(|mut entries| entries.any(is_file))
+    fs::read_dir(folder).is_ok_and(|mut entries| entries.any(is_its))
 }
 
 /// What stands at the head of each file of a map.
@@ -225,11 +229,27 @@ mod tests {
         fs::write(path.join("main.json"), serde_json::to_vec(&fold().card).unwrap()).unwrap();
         // A start that was cut short.
         fs::create_dir(path.join("main")).unwrap();
+        fs::write(path.join("main/new.checkpoint"), b"half").unwrap();
         for _ in 0..2 {
             assert_eq!(store.ids().unwrap(), ["main"]);
             assert_eq!(load(&store).unwrap().fold.card, fold().card);
         }
         assert!(path.join("main.map.imported").is_file());
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    #[test]
+    fn a_map_whose_birth_was_cut_short_is_born_again() {
+        let path = folder("birth");
+        let store = Store::open(&path).unwrap();
+        fs::create_dir(path.join("main")).unwrap();
+        fs::write(path.join("main/new.checkpoint"), b"half").unwrap();
+        assert!(store.ids().unwrap().is_empty());
+        store.create("main", &fold()).unwrap();
+        // Only the first checkpoint was written: nothing was acknowledged yet.
+        fs::remove_file(path.join("main").join(toponym_journal::segment::name(1))).unwrap();
+        assert_eq!(store.ids().unwrap(), ["main"]);
+        assert_eq!(load(&store).unwrap().tail, []);
         fs::remove_dir_all(path).unwrap();
     }
 

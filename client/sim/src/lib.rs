@@ -19,6 +19,7 @@ mod floorplan;
 mod follow;
 pub mod geom;
 mod guide;
+pub mod hall;
 mod laser;
 mod names;
 mod people;

@@ -173,6 +173,10 @@ fn tail<D: Disk>(
 ) -> Result<(Vec<(u64, Entry)>, u64), JournalError> {
     let mut firsts: Vec<u64> = names.iter().filter_map(|n| segment::first_of(n)).collect();
     firsts.sort_unstable();
+    if firsts.is_empty() && checkpoint.index == 0 {
+        // It was stopped while it began.
+        return Ok((Vec::new(), 0));
+    }
     let needed = firsts.iter().rposition(|first| *first <= checkpoint.index + 1);
     let Some(firsts) = needed.and_then(|k| firsts.get(k..)) else {
         let why = format!("the entries after {} are missing", checkpoint.index);

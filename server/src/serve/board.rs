@@ -35,6 +35,8 @@ pub struct MapView {
     pub durable: Mutex<Option<(u64, u64)>>,
     /// Bytes of messages on their way to the filter.
     pub backlog_bytes: AtomicUsize,
+    /// Number of the last entry that the filter has taken in.
+    pub taken: AtomicU64,
     /// Messages that are held back until time passes.
     pub held: AtomicUsize,
     /// Scans that were of no use, and why the newest was not.
@@ -70,6 +72,7 @@ impl MapView {
             stamp_ns: AtomicI64::new(card.stamp_ns),
             durable: Mutex::new(durable),
             backlog_bytes: AtomicUsize::new(0),
+            taken: AtomicU64::new(0),
             held: AtomicUsize::new(0),
             unused: Mutex::default(),
             trouble: Mutex::default(),

@@ -8,8 +8,8 @@ use toponym_core::Effect;
 use toponym_core::edge::EdgeKind;
 use toponym_core::effects::TrackState;
 use toponym_journal::{Entry, Event};
-use toponym_proto::Stamp;
 use toponym_proto::answer::{ANSWER_VERSION, Heard, Jump, MapIdentity, PoseOut};
+use toponym_proto::{Message, Stamp};
 use tracing::{debug, error, info, warn};
 
 use super::board::{Board, MapView, lock};
@@ -84,8 +84,8 @@ impl Mapping {
                     false
                 }
                 Ok(Step::Mend(index, entry, reply)) => {
-                    let done = self.mend(index, entry);
-                    let _ = reply.send(done);
+                    let done = self.take(index, entry);
+                    let _ = reply.send(done.unwrap_or_else(|| Err("nothing came of it".to_owned())));
                     false
                 }
                 Ok(Step::Save(reply)) => {
@@ -129,8 +129,14 @@ impl Mapping {
             self.saver.worked(began.elapsed());
             self.view.stamp_ns.store(self.fold.card.stamp_ns, Ordering::Relaxed);
         }
-        self.view.held.store(self.fold.held(), Ordering::Relaxed);
+        self.tell_progress();
         self.show();
+    }
+
+    /// The journal's thread passes the time while something is held.
+    fn tell_progress(&self) {
+        self.view.held.store(self.fold.held(), Ordering::Relaxed);
+        self.view.taken.store(self.index, Ordering::Release);
     }
 
     fn do_what_is_due(&mut self, idle: bool) {
@@ -166,23 +172,8 @@ impl Mapping {
         self.graph_due.mark();
     }
 
-    /// An operator's command.
-    fn mend(&mut self, index: u64, entry: Entry) -> Result<String, String> {
-        let mut done = None;
-        self.index = index;
-        let record = &mut self.record;
-        self.fold.take(entry, &mut |outcome| match outcome {
-            Outcome::Enters(message) => record.iter_mut().for_each(|r| r.write(message)),
-            Outcome::Effect(Effect::Mended(words)) => done = Some(words),
-            Outcome::Effect(_) | Outcome::Heard(_) => {}
-        });
-        self.record_due.mark();
-        self.show();
-        done.unwrap_or_else(|| Err("nothing came of it".to_owned()))
-    }
-
-    /// One entry, and its effects out.
-    fn take(&mut self, index: u64, entry: Entry) {
+    /// One entry, and its effects out. Tells what an operator's command did, if it is one.
+    fn take(&mut self, index: u64, entry: Entry) -> Option<Result<String, String>> {
         let began = Instant::now();
         let bytes = bytes_of(&entry.event);
         let (mut effects, mut heards) = (Vec::new(), Vec::new());
@@ -195,22 +186,28 @@ impl Mapping {
         self.index = index;
         self.record_due.mark();
         self.view.stamp_ns.store(self.fold.card.stamp_ns, Ordering::Relaxed);
-        self.view.held.store(self.fold.held(), Ordering::Relaxed);
+        self.tell_progress();
         self.view.backlog_bytes.fetch_sub(bytes, Ordering::Relaxed);
         self.saver.worked(began.elapsed());
-        let told = |e: &Effect| matches!(e, Effect::Jumped { .. } | Effect::StateChanged { .. });
+        let told =
+            |e: &Effect| matches!(e, Effect::Jumped { .. } | Effect::StateChanged { .. } | Effect::Mended(_));
         if !heards.is_empty() || effects.iter().any(told) {
             // Who is told of it may ask at once.
             self.show();
         } else if !effects.is_empty() {
             self.snapshot_due.mark();
         }
+        let mended = effects.iter().find_map(|e| match e {
+            Effect::Mended(done) => Some(done.clone()),
+            _ => None,
+        });
         for effect in effects {
             self.publish(effect);
         }
         for heard in &heards {
             self.tell(heard);
         }
+        mended
     }
 
     fn tell(&self, heard: &Heard) {
@@ -293,9 +290,9 @@ impl Mapping {
 /// Bytes that something of a robot's or a guide's takes on its way to the filter.
 pub fn bytes_of(event: &Event) -> usize {
     match event {
+        // An operator's comes another way; the others are small, or the journal's own.
+        Event::Message(Message::Mend(_)) | Event::Gap { .. } | Event::Tick | Event::Hold(_) => 0,
         Event::Message(message) => message.weight_bytes(),
         Event::Say { say, .. } => say.weight_bytes(),
-        // Small, and the journal's own.
-        Event::Gap { .. } | Event::Tick | Event::Hold(_) => 0,
     }
 }

@@ -74,7 +74,7 @@ impl Scribe {
             let mut batch = Vec::new();
             match work.recv_timeout(TICK) {
                 Ok(first) => batch.push(first),
-                Err(RecvTimeoutError::Timeout) if self.view.held.load(Ordering::Relaxed) > 0 => {
+                Err(RecvTimeoutError::Timeout) if self.waits_for_time() => {
                     batch.push(Work::Take(Event::Tick));
                 }
                 Err(RecvTimeoutError::Timeout) => continue,
@@ -112,6 +112,12 @@ impl Scribe {
                 return;
             }
         }
+    }
+
+    /// Whether the filter has taken all there is, and holds something back until time passes.
+    fn waits_for_time(&self) -> bool {
+        self.view.taken.load(Ordering::Acquire) >= self.journal.durable()
+            && self.view.held.load(Ordering::Relaxed) > 0
     }
 
     fn append(&mut self, work: Work) -> Option<Step> {

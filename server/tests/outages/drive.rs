@@ -7,7 +7,8 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use toponym::{Guide, Planner, Robot, RobotConfig};
 use toponym_proto::record::RecordReader;
-use toponym_proto::{Clock, Header, Laser, Message, Odom, Pose, Scan, Setup, Stamp};
+use toponym_proto::{Clock, Message, Stamp};
+use toponym_sim::hall::{PERIOD_NS, message};
 
 /// Nothing here takes that long unless it has failed.
 pub const PATIENCE: Duration = Duration::from_secs(120);
@@ -84,44 +85,6 @@ pub fn setting(name: &str, default: u64) -> u64 {
     std::env::var(name).ok().map_or(default, |text| text.parse().unwrap())
 }
 
-fn setup() -> Message {
-    let laser = Laser {
-        id: "front".into(),
-        x_m: 0.0,
-        y_m: 0.0,
-        yaw_rad: 0.0,
-        upside_down: false,
-        range_min_m: 0.05,
-        range_max_m: 30.0,
-        ignored_rad: vec![],
-    };
-    Message::Setup(Setup { header: Header::default(), map: "main".into(), lasers: vec![laser] })
-}
-
-/// The message of this number of a robot that goes up and down a hall of 12 m by 6 m.
-fn message(n: u64) -> Message {
-    let header = Header { stamp: Stamp { ns: n as i64 * 25_000_000 }, ..Header::default() };
-    let along = (n as f64 * 0.01) % 16.0;
-    let x_m = 2.0 + if along < 8.0 { along } else { 16.0 - along };
-    if n % 2 == 1 {
-        return Message::Odom(Odom { header, odom_from_body: Pose { x_m, y_m: 3.0, yaw_rad: 0.0 } });
-    }
-    let range = |k: i32| {
-        let (sin, cos) = (-2.0_f64 + 0.05 * f64::from(k)).sin_cos();
-        let along = if cos > 0.0 { (12.0 - x_m) / cos } else { -x_m / cos };
-        let across = if sin > 0.0 { 3.0 / sin } else { -3.0 / sin };
-        along.min(across) as f32
-    };
-    Message::Scan(Scan {
-        header,
-        laser: "front".into(),
-        angle_min_rad: -2.0,
-        angle_increment_rad: 0.05,
-        time_increment_s: 0.0,
-        ranges_m: (0..81).map(range).collect(),
-    })
-}
-
 /// The robot and its guide.
 pub struct Drive {
     session: zenoh::Session,
@@ -177,11 +140,10 @@ impl Drive {
 
     /// Sends the next message, and a sentence now and then.
     pub async fn go(&mut self) {
-        let next = if self.sent == 0 { setup() } else { message(self.sent) };
-        self.robot.send(next).await.unwrap();
+        self.robot.send(message(self.sent, "main", 81)).await.unwrap();
         self.sent += 1;
         if self.sent.is_multiple_of(SENTENCE_EACH) {
-            let began = Some(Stamp { ns: self.sent as i64 * 25_000_000 });
+            let began = Some(Stamp { ns: self.sent as i64 * PERIOD_NS });
             let say = toponym_proto::Say { began, ..self.guide.sentence("this is the workshop") };
             self.guide.publish(&say).await.unwrap();
             self.said += 1;
