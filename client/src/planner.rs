@@ -51,6 +51,12 @@ impl Planner {
         ask(&self.session, &self.keys.ask(&self.map, Ask::Grid), &arguments, self.timeout).await
     }
 
+    /// Deletes the map; the server keeps its folder aside. Its robot has to present itself again.
+    pub async fn delete(&self) -> Result<Done, ClientError> {
+        let arguments = selector::encode([("map", self.map.as_str())]);
+        ask(&self.session, &self.keys.command("delete"), &arguments, self.timeout).await
+    }
+
     /// Saves the map. The answer comes after everything that was acknowledged before has gone
     /// through the filter.
     pub async fn save(&self) -> Result<Done, ClientError> {

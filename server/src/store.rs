@@ -142,6 +142,16 @@ impl Store {
         Journal::create(disk, identity(fold), map).map_err(|source| StoreError::Journal { path, source })
     }
 
+    /// Gives a map's folder a name that is no map's, and tells it.
+    pub fn set_aside(&self, id: &str) -> Result<PathBuf, StoreError> {
+        let path = self.folder.join(id);
+        let free = (1..100_000).map(|k| self.folder.join(format!("{id}.deleted-{k}"))).find(|p| !p.exists());
+        let aside = free.unwrap_or_else(|| self.folder.join(format!("{id}.deleted")));
+        fs::rename(&path, &aside).map_err(io_error(&path))?;
+        sync_folder(&self.folder).map_err(io_error(&self.folder))?;
+        Ok(aside)
+    }
+
     /// Begins the journal of a map that an earlier build saved.
     fn import(&self, id: &str, hold: Duration) -> Result<(), StoreError> {
         let (map, card) = (self.folder.join(format!("{id}.map")), self.folder.join(format!("{id}.json")));

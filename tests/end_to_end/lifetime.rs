@@ -1,8 +1,10 @@
 //! Start, stop, and what outlives them.
 
 use crate::site::{Folder, Site, drive, saved_map, settings, setup};
-use toponym_proto::answer::{GraphReply, Info};
+use toponym_proto::answer::{ErrorCode, GraphReply, Info};
 use toponym_proto::keys::Ask;
+use toponym_proto::{Header, Message, Setup};
+use toponym_server::config::ServerConfig;
 use toponym_server::serve::{Server, serve};
 
 #[tokio::test(flavor = "multi_thread")]
@@ -159,4 +161,33 @@ async fn a_broken_map_stops_only_itself() {
 async fn serving_ends_when_asked_to() {
     let folder = Folder::new();
     serve(settings(&folder), None, std::future::ready(())).await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_deleted_map_makes_room_and_is_kept() {
+    let folder = Folder::new();
+    let config = ServerConfig { maps_max: 1, ..settings(&folder) };
+    let site = Site::start(config).await;
+    let (acks, states) = (site.acks("r1").await, site.states("*").await);
+    for message in drive("r1", "main").iter().take(9) {
+        site.send(message).await;
+    }
+    acks.ack_of(8).await;
+    site.send(&setup("r2", "annex")).await;
+    states.state(|s| s.robot == "r2" && s.error.is_some()).await;
+    let delete = |map: &str| format!("{}?map={map}", site.keys.command("delete"));
+    assert_eq!(site.ask(&delete("attic"), "").await.unwrap_err().code, ErrorCode::NoSuchMap);
+    site.ask(&delete("main"), "").await.unwrap();
+    assert!(folder.0.join("data/main.deleted-1").is_dir() && !folder.0.join("data/main").exists());
+    let lost = states.state(|s| s.robot == "r1" && s.map.is_none()).await;
+    assert!(lost.error.unwrap().message.contains("was deleted"));
+    // There is room for the other one's map now.
+    let acks = site.acks("r2").await;
+    let again = |message: &Message| match message.clone() {
+        Message::Setup(m) => Message::Setup(Setup { header: Header { boot: 2, ..m.header }, ..m }),
+        other => other,
+    };
+    site.send(&again(&setup("r2", "annex"))).await;
+    acks.ack_of(0).await;
+    site.stop().await;
 }

@@ -5,12 +5,13 @@ use arc_swap::ArcSwap;
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
 use toponym_core::Snapshot;
 use toponym_proto::answer::{MapIdentity, Problem, RobotState};
 use toponym_proto::{Keys, Stamp};
 
+use super::door::Arrival;
 use super::scribe::Work;
 use crate::fold::Card;
 
@@ -115,6 +116,8 @@ pub struct Board {
     pub overrun: AtomicU64,
     /// Bytes of messages that wait to be looked at.
     pub queued_bytes: AtomicUsize,
+    /// Way to the intake, for commands that it carries out; none before it runs.
+    pub control: OnceLock<SyncSender<Arrival>>,
 }
 
 impl Board {
@@ -129,7 +132,18 @@ impl Board {
             latest: Mutex::default(),
             overrun: AtomicU64::new(0),
             queued_bytes: AtomicUsize::new(0),
+            control: OnceLock::new(),
         }
+    }
+
+    /// Shows a map no more.
+    pub fn remove_map(&self, id: &str) {
+        let mut maps = BTreeMap::clone(&self.maps.load());
+        maps.remove(id);
+        self.maps.store(Arc::new(maps));
+        let mut latest = lock(&self.latest);
+        latest.remove(&self.keys.graph(id));
+        latest.remove(&self.keys.jump(id));
     }
 
     /// Shows one more map.

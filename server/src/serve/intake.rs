@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 use toponym_proto::answer::{Ack, Counts, ErrorCode, Problem, RobotState};
 use toponym_proto::codec::place_of;
@@ -13,6 +13,7 @@ use toponym_proto::{Keys, Message, Refused, Say};
 use tracing::{error, warn};
 
 use super::board::{Board, lock};
+use super::door::Arrival;
 use super::maps::Maps;
 use super::outbox::Outbox;
 use super::robot::Robot;
@@ -35,82 +36,6 @@ const FEW: u64 = 16;
 const ROBOT_WAIT: Duration = Duration::from_secs(2);
 /// Sentences that wait so.
 const WAITING_MAX: usize = 64;
-
-/// What the network delivers.
-pub enum Arrival {
-    /// A payload on a key.
-    Payload {
-        /// The key.
-        key: String,
-        /// Zenoh's encoding.
-        encoding: String,
-        /// The bytes; shorter than the limit.
-        bytes: Vec<u8>,
-    },
-    /// A payload too long to be kept.
-    TooLarge {
-        /// The key.
-        key: String,
-        /// Its length.
-        bytes: usize,
-    },
-    /// The server stops: move on what there is, then end.
-    Stop,
-}
-
-/// The door: hands arrivals over without ever blocking.
-#[derive(Clone)]
-pub struct Door {
-    queue: SyncSender<Arrival>,
-    board: Arc<Board>,
-    payload_max_bytes: usize,
-    queue_max_bytes: usize,
-}
-
-impl Door {
-    /// With the queue behind it.
-    pub fn new(board: Arc<Board>, config: &ServerConfig) -> (Self, Receiver<Arrival>) {
-        let (queue, arrivals) = sync_channel(config.queue_messages);
-        let payload_max_bytes = config.limits.payload_bytes;
-        (Self { queue, board, payload_max_bytes, queue_max_bytes: config.queue_bytes }, arrivals)
-    }
-
-    /// For Zenoh's callbacks.
-    pub fn sample(&self, sample: &zenoh::sample::Sample) {
-        if sample.kind() != zenoh::sample::SampleKind::Put {
-            return;
-        }
-        let (key, bytes) = (sample.key_expr().to_string(), sample.payload().len());
-        let waiting = self.board.queued_bytes.fetch_add(bytes, Ordering::Relaxed);
-        if waiting + bytes > self.queue_max_bytes {
-            return self.overrun(bytes);
-        }
-        let arrival = if bytes > self.payload_max_bytes {
-            Arrival::TooLarge { key, bytes }
-        } else {
-            let encoding = sample.encoding().to_string();
-            Arrival::Payload { key, encoding, bytes: sample.payload().to_bytes().into_owned() }
-        };
-        if self.queue.try_send(arrival).is_err() {
-            self.overrun(bytes);
-        }
-    }
-
-    /// There is no room: what is dropped was acknowledged to nobody.
-    fn overrun(&self, bytes: usize) {
-        self.board.queued_bytes.fetch_sub(bytes, Ordering::Relaxed);
-        let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
-        // The first, and then each doubling: a flood must not flood the log.
-        if overrun.is_power_of_two() {
-            error!(overrun, "messages arrive faster than they can be looked at: dropped, to be sent again");
-        }
-    }
-
-    /// Tells the intake to end.
-    pub fn close(&self) {
-        let _ = self.queue.send(Arrival::Stop);
-    }
-}
 
 /// A sentence whose robot was never heard.
 struct WaitingSay {
@@ -213,6 +138,10 @@ impl Intake {
                 let max = self.config.limits.payload_bytes;
                 (key, Err(Refused::TooLarge { bytes, max }), None)
             }
+            Arrival::Delete { map, reply } => {
+                let _ = reply.send(self.delete(&map));
+                return;
+            }
             Arrival::Stop => return,
         };
         let robot = match self.keys.input(&key) {
@@ -235,6 +164,14 @@ impl Intake {
             Ok(message) => self.take_message(&robot, &key, message),
             Err(refused) => self.refuse(&robot, &key, place, &refused),
         }
+    }
+
+    fn delete(&mut self, map: &str) -> Result<(), Problem> {
+        self.maps.delete(map)?;
+        for robot in self.robots.values_mut() {
+            robot.lose_map(map);
+        }
+        Ok(())
     }
 
     fn read(&self, key: &str, encoding: &str, bytes: &[u8]) -> Result<Message, Refused> {

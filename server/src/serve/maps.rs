@@ -36,7 +36,8 @@ pub struct Maps {
     outbox: Outbox,
     store: Arc<Store>,
     records: Option<Recordings>,
-    threads: Vec<JoinHandle<Result<(), String>>>,
+    /// Each with its map.
+    threads: Vec<(String, JoinHandle<Result<(), String>>)>,
     /// The saved map of each robot that it was on last, and (boot, seq) of the last message in it.
     saved: BTreeMap<String, (Arc<MapView>, (u64, u64))>,
 }
@@ -172,11 +173,12 @@ impl Maps {
         };
         let scribe = Scribe::new(view.clone(), journal, steps, newest);
         let named = |what: &str| std::thread::Builder::new().name(format!("{what} {id}"));
-        self.threads.push(named("map").spawn(move || mapping.run(tail, &taken))?);
-        self.threads.push(named("journal").spawn(move || {
+        self.threads.push((id.into(), named("map").spawn(move || mapping.run(tail, &taken))?));
+        let journal = named("journal").spawn(move || {
             scribe.run(&queue);
             Ok(())
-        })?);
+        })?;
+        self.threads.push((id.into(), journal));
         self.board.add_map(view.clone());
         Ok(view)
     }
@@ -190,8 +192,35 @@ impl Maps {
         for view in self.board.maps.load().values() {
             let _ = view.work.send(Work::Stop);
         }
+        self.join(|_| true)
+    }
+
+    /// Ends a map and sets its folder aside; there is room for another then.
+    ///
+    /// # Errors
+    /// If there is none, or its folder can't be renamed.
+    pub fn delete(&mut self, id: &str) -> Result<(), Problem> {
+        let view = self.board.maps.load().get(id).cloned();
+        if view.is_none() && lock(&self.board.broken).remove(id).is_none() {
+            let message = format!("there is no map {id:?}");
+            return Err(Problem::new(ErrorCode::NoSuchMap, message).field("map"));
+        }
+        if let Some(view) = view {
+            *lock(&view.stops_at) = Some(Instant::now());
+            let _ = view.work.send(Work::Stop);
+            self.saved.retain(|_, (saved, _)| saved.id != id);
+            self.board.remove_map(id);
+        }
+        self.join(|of| of == id);
+        let kept = self.store.set_aside(id).map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))?;
+        info!(map = id, kept = %kept.display(), "deleted; what it was is kept");
+        Ok(())
+    }
+
+    /// Waits for the threads of some maps; tells what became of those that could not be saved.
+    fn join(&mut self, which: impl Fn(&str) -> bool) -> Vec<String> {
         let mut failed = Vec::new();
-        for thread in self.threads.drain(..) {
+        for (_, thread) in self.threads.extract_if(.., |(id, _)| which(id)) {
             let name = thread.thread().name().unwrap_or_default().to_string();
             let why = match thread.join() {
                 Ok(Ok(())) => continue,

@@ -15,6 +15,7 @@
 
 pub mod args;
 pub mod board;
+pub mod door;
 mod intake;
 mod mapping;
 mod maps;
@@ -32,7 +33,8 @@ pub use network::NetworkError;
 use crate::config::{ConfigError, ServerConfig};
 use crate::store::{Store, StoreError};
 use board::Board;
-use intake::{Door, Intake};
+use door::Door;
+use intake::Intake;
 use maps::Maps;
 use outbox::Outbox;
 use recording::Recordings;

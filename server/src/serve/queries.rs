@@ -18,6 +18,7 @@ use toponym_proto::selector::{self, Arguments};
 use toponym_proto::{Limits, Mend, Message, Stamp};
 
 use super::board::{Board, MapView, lock};
+use super::door::Arrival;
 use super::scribe::Work;
 use crate::convert;
 
@@ -82,11 +83,12 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
         ["info"] => info(board, &arguments),
         ["time"] => time(board, arguments),
         ["do", "save"] => save(board, &arguments),
+        ["do", "delete"] => delete(board, arguments),
         ["do", command @ ("undo" | "rename" | "forget")] => mend(board, command, arguments),
         ["do", command] => {
             Err(Problem::new(ErrorCode::Unsupported, format!("there is no command {command:?}"))
                 .field("key")
-                .hint("this server knows do/save, do/undo, do/rename, do/forget"))
+                .hint("this server knows do/save, do/delete, do/undo, do/rename, do/forget"))
         }
         ["map", id, "ask", what] => {
             let map = map(board, id)?;
@@ -267,6 +269,18 @@ fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
         None => save_all(board)?,
     };
     json(&Done { v: ANSWER_VERSION, query: "save".into(), maps })
+}
+
+/// `do/delete?map=…`.
+fn delete(board: &Board, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+    let [id] = take(arguments, ["map"])?;
+    let missing = || Problem::new(ErrorCode::BadArgument, "map is missing").field("map");
+    let (map, (reply, done)) = (id.ok_or_else(missing)?, sync_channel(1));
+    let stops = || Problem::new(ErrorCode::Internal, "the server stops");
+    let control = board.control.get().ok_or_else(stops)?;
+    control.send(Arrival::Delete { map: map.clone(), reply }).map_err(|_| stops())?;
+    done.recv_timeout(COMMAND_WAIT).map_err(|_| stops())??;
+    json(&Done { v: ANSWER_VERSION, query: "delete".into(), maps: vec![map] })
 }
 
 /// Saves all maps and tells their ids.

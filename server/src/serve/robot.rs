@@ -266,6 +266,16 @@ impl Robot {
         self.is_settled() && self.sequencer.is_empty()
     }
 
+    /// Its map was deleted, if it was this one: it has to present itself again.
+    pub fn lose_map(&mut self, id: &str) {
+        if self.map.as_ref().is_some_and(|map| map.id == id) {
+            let message = format!("map {id:?} was deleted");
+            let hint = "send a setup again: it makes a new map";
+            self.no_map = Some(Problem::new(ErrorCode::NoSuchMap, message).field("map").hint(hint));
+            self.map = None;
+        }
+    }
+
     fn fail(&mut self, loses: bool) {
         if let Some(map) = self.map.take() {
             let message = format!("map {:?} has stopped: see the server's log", map.id);

@@ -52,6 +52,29 @@ pub struct ForgetArgs {
     at: At,
 }
 
+/// Arguments of `delete`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Example:
+  toponym delete attic
+
+The server keeps the map's folder, under another name: rename it back, with the server stopped, to have it again. The robot
+that mapped it has to present itself again. Exit code 5 if there is no such map.")]
+pub struct DeleteArgs {
+    /// The map.
+    map: String,
+    /// How long to wait for the answer.
+    #[arg(long, value_name = "S", default_value = "60", value_parser = super::seconds)]
+    timeout: Duration,
+}
+
+pub async fn delete(endpoint: &str, site: &str, args: &DeleteArgs) -> Result<u8, Failure> {
+    let session = toponym::open(endpoint).await?;
+    Planner::new(&session, site, &args.map, args.timeout)?.delete().await?;
+    println!("map {} is deleted; the server keeps its folder aside", args.map);
+    Ok(exit::FOUND)
+}
+
 /// Which map, and how patiently.
 #[derive(Debug, clap::Args)]
 struct At {

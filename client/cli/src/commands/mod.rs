@@ -72,6 +72,8 @@ enum Command {
     Rename(mend::RenameArgs),
     /// Forget a name.
     Forget(mend::ForgetArgs),
+    /// End a map, and make room for another.
+    Delete(mend::DeleteArgs),
     /// How does the server do?
     Status(status::StatusArgs),
     /// Play a recorded log to the server, as robot and guide.
@@ -125,6 +127,7 @@ pub async fn run(args: Args) -> ExitCode {
         Command::Undo(undo) => mend::undo(&endpoint, &args.site, undo).await,
         Command::Rename(rename) => mend::rename(&endpoint, &args.site, rename).await,
         Command::Forget(forget) => mend::forget(&endpoint, &args.site, forget).await,
+        Command::Delete(delete) => mend::delete(&endpoint, &args.site, delete).await,
         Command::Status(asked) => status::status(&endpoint, &args.site, asked).await,
         Command::Replay(replay) => play::replay(&endpoint, &args.site, replay).await,
         Command::Simulate(simulate) => simulated(simulate),

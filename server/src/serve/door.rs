@@ -1,0 +1,95 @@
+//! The door: what the network delivers is handed to the intake without ever blocking. What finds no room was
+//! acknowledged to nobody.
+
+use std::sync::Arc;
+use std::sync::atomic::Ordering;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use toponym_proto::answer::Problem;
+use tracing::error;
+
+use super::board::Board;
+use crate::config::ServerConfig;
+
+/// What the network delivers.
+pub enum Arrival {
+    /// A payload on a key.
+    Payload {
+        /// The key.
+        key: String,
+        /// Zenoh's encoding.
+        encoding: String,
+        /// The bytes; shorter than the limit.
+        bytes: Vec<u8>,
+    },
+    /// A payload too long to be kept.
+    TooLarge {
+        /// The key.
+        key: String,
+        /// Its length.
+        bytes: usize,
+    },
+    /// Delete a map, and tell what became of it.
+    Delete {
+        /// The map.
+        map: String,
+        /// Where to tell.
+        reply: SyncSender<Result<(), Problem>>,
+    },
+    /// The server stops: move on what there is, then end.
+    Stop,
+}
+
+/// The door: hands arrivals over without ever blocking.
+#[derive(Clone)]
+pub struct Door {
+    queue: SyncSender<Arrival>,
+    board: Arc<Board>,
+    payload_max_bytes: usize,
+    queue_max_bytes: usize,
+}
+
+impl Door {
+    /// With the queue behind it.
+    pub fn new(board: Arc<Board>, config: &ServerConfig) -> (Self, Receiver<Arrival>) {
+        let (queue, arrivals) = sync_channel(config.queue_messages);
+        let _ = board.control.set(queue.clone());
+        let payload_max_bytes = config.limits.payload_bytes;
+        (Self { queue, board, payload_max_bytes, queue_max_bytes: config.queue_bytes }, arrivals)
+    }
+
+    /// For Zenoh's callbacks.
+    pub fn sample(&self, sample: &zenoh::sample::Sample) {
+        if sample.kind() != zenoh::sample::SampleKind::Put {
+            return;
+        }
+        let (key, bytes) = (sample.key_expr().to_string(), sample.payload().len());
+        let waiting = self.board.queued_bytes.fetch_add(bytes, Ordering::Relaxed);
+        if waiting + bytes > self.queue_max_bytes {
+            return self.overrun(bytes);
+        }
+        let arrival = if bytes > self.payload_max_bytes {
+            Arrival::TooLarge { key, bytes }
+        } else {
+            let encoding = sample.encoding().to_string();
+            Arrival::Payload { key, encoding, bytes: sample.payload().to_bytes().into_owned() }
+        };
+        if self.queue.try_send(arrival).is_err() {
+            self.overrun(bytes);
+        }
+    }
+
+    /// There is no room: what is dropped was acknowledged to nobody.
+    fn overrun(&self, bytes: usize) {
+        self.board.queued_bytes.fetch_sub(bytes, Ordering::Relaxed);
+        let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
+        // The first, and then each doubling: a flood must not flood the log.
+        if overrun.is_power_of_two() {
+            error!(overrun, "messages arrive faster than they can be looked at: dropped, to be sent again");
+        }
+    }
+
+    /// Tells the intake to end.
+    pub fn close(&self) {
+        let _ = self.queue.send(Arrival::Stop);
+    }
+}
