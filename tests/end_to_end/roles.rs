@@ -81,3 +81,21 @@ async fn strangers_do_not_crowd_out_a_robot() {
     assert_eq!(site.ask(&site.keys.state("stranger"), "").await.unwrap_err().code, ErrorCode::NoSuchQuery);
     site.stop().await;
 }
+
+#[tokio::test(flavor = "multi_thread")]
+async fn strangers_with_gaps_do_not_keep_a_robot_out() {
+    let folder = Folder::new();
+    let mut config = settings(&folder);
+    (config.robots_max, config.join_wait_s) = (4, 60.0);
+    let site = Site::start(config).await;
+    let acks = site.acks("r1").await;
+    // What comes before their first message never comes.
+    for k in 0..9 {
+        site.send(&crate::site::odom(&format!("stranger{k}"), 5, 0.0)).await;
+    }
+    for message in drive("r1", "main").iter().take(5) {
+        site.send(message).await;
+    }
+    acks.ack_of(4).await;
+    site.stop().await;
+}

@@ -34,6 +34,10 @@ const BATCH: usize = 256;
 const FEW: u64 = 16;
 /// How long a sentence waits for a robot that was never heard: its guide may be faster.
 const ROBOT_WAIT: Duration = Duration::from_secs(2);
+/// Bytes of all robots' messages that wait for those before them, or for room in their maps: each robot may have its share …
+const WAITING_MAX_BYTES: usize = 256 << 20;
+/// … as if there were at least so many.
+const ROBOTS_LEAST: usize = 8;
 /// Sentences that wait so.
 const WAITING_MAX: usize = 64;
 
@@ -194,10 +198,11 @@ impl Intake {
         self.robots.get_mut(id)
     }
 
-    /// Makes room by forgetting a robot that is on no map. False if there is none.
+    /// Makes room by forgetting the robot on no map of which nothing has come for longest; nothing of it was acknowledged.
+    /// False if there is none.
     fn forget_a_stranger(&mut self) -> bool {
-        let stranger = self.robots.iter().find(|(_, robot)| robot.map().is_none() && robot.is_idle());
-        let Some(id) = stranger.map(|(id, _)| id.clone()) else {
+        let strangers = self.robots.iter().filter(|(_, robot)| robot.map().is_none());
+        let Some(id) = strangers.min_by_key(|(_, robot)| robot.heard_at()).map(|(id, _)| id.clone()) else {
             return false;
         };
         self.robots.remove(&id);
@@ -210,11 +215,14 @@ impl Intake {
     }
 
     fn take_message(&mut self, id: &str, key: &str, message: Message) {
+        let robots = self.robots.len();
         let now = self.now();
         let Some(robot) = self.robot(id) else {
             return;
         };
-        if robot.is_full() {
+        // Robots that leave gaps may fill what is theirs, and no more.
+        let share_bytes = WAITING_MAX_BYTES / robots.max(ROBOTS_LEAST);
+        if robot.is_full(share_bytes) {
             let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
             if overrun.is_power_of_two() {
                 error!(key, overrun, "the map can't keep up: messages are dropped, to be sent again");

@@ -34,6 +34,8 @@ pub struct Robot {
     parked: Option<Step>,
     /// The map its streams go to.
     map: Option<Arc<MapView>>,
+    /// When something of it arrived last.
+    heard_at: Duration,
     /// Newest boot.
     boot: Option<u64>,
     /// First and newest stamp of that boot that have arrived; the first is not known of a robot of an earlier run.
@@ -65,6 +67,7 @@ impl Robot {
             id: id.into(),
             sequencer: Sequencer::new(patience, watermark),
             parked: None,
+            heard_at: Duration::ZERO,
             first: None,
             newest: map.as_ref().map(|map| map.stamp()),
             map,
@@ -78,9 +81,14 @@ impl Robot {
         }
     }
 
-    /// Whether no more of its streams fits in: the map can't keep up.
-    pub fn is_full(&self) -> bool {
-        self.sequencer.len() >= self.queue_messages || self.sequencer.bytes() >= BACKLOG_MAX_BYTES
+    /// Whether no more of its streams fits in, of which so many bytes may wait: the map can't keep up.
+    pub fn is_full(&self, share_bytes: usize) -> bool {
+        self.sequencer.len() >= self.queue_messages || self.sequencer.bytes() >= share_bytes
+    }
+
+    /// When something of it arrived last.
+    pub fn heard_at(&self) -> Duration {
+        self.heard_at
     }
 
     /// Whether its streams go to a map.
@@ -90,6 +98,7 @@ impl Robot {
 
     /// Takes in a message of the robot's streams.
     pub fn push(&mut self, now: Duration, message: Message) {
+        self.heard_at = now;
         if let Some(header) = message.header() {
             if Some(header.boot) > self.boot {
                 // What was wrong with an earlier start says nothing of this one.
@@ -153,6 +162,7 @@ impl Robot {
 
     /// Counts a refusal; the newest is told in the robot's state. `place`: (boot, seq), if that could be read.
     pub fn refuse(&mut self, now: Duration, place: Option<(u64, u64)>, problem: Problem) {
+        self.heard_at = now;
         self.counts.refused += 1;
         self.refusal = Some(problem);
         if let Some(place) = place {
@@ -259,11 +269,6 @@ impl Robot {
     /// Whether all that is in order was handed over and is on disk, or can't be for now.
     pub fn is_settled(&self) -> bool {
         self.parked.is_none() && self.is_drained()
-    }
-
-    /// Whether nothing waits at all.
-    pub fn is_idle(&self) -> bool {
-        self.is_settled() && self.sequencer.is_empty()
     }
 
     /// Its map was deleted, if it was this one: it has to present itself again.

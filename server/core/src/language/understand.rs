@@ -226,13 +226,13 @@ pub fn parse_hearings(text: &str, alternatives: &[(String, f64)]) -> Parse {
     Parse { analyses: all }
 }
 
-/// The name asked for by a question ("where is the gym?") or a bare name ("gym").
+/// The name asked for by a question ("where is the gym?") or a bare name ("gym"), which needs no judge.
 pub fn parse_query(text: &str) -> Option<Name> {
-    for act in parse(text).acts() {
-        if let Some(name) = asked_name(&act.content) {
-            return Some(name);
-        }
-    }
+    bare_name(text).or_else(|| parse(text).acts().iter().find_map(|act| asked_name(&act.content)))
+}
+
+/// The name that is all of a text.
+fn bare_name(text: &str) -> Option<Name> {
     let sentences = sentences(text);
     let [only] = sentences.as_slice() else { return None };
     let mut at = Cursor::new(&only.words);
