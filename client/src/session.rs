@@ -122,7 +122,13 @@ pub(crate) async fn ask<T: DeserializeOwned>(
     let selector = if arguments.is_empty() { key.to_owned() } else { format!("{key}?{arguments}") };
     loop {
         let left = deadline.saturating_duration_since(Instant::now());
-        let replies = session.get(&selector).timeout(left).consolidation(ConsolidationMode::None).await?;
+        let replies = session
+            .get(&selector)
+            .timeout(left)
+            .consolidation(ConsolidationMode::None)
+            // A question is not worth waiting for company on its way.
+            .express(true)
+            .await?;
         let Ok(reply) = timeout_at(deadline, replies.recv_async()).await else {
             return Err(if silent { nobody() } else { late() });
         };

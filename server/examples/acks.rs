@@ -5,7 +5,7 @@
 
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
-use toponym::{Planner, Robot, RobotConfig};
+use toponym::{Guide, Planner, Robot, RobotConfig};
 use toponym_proto::Clock;
 use toponym_server::config::ServerConfig;
 use toponym_server::serve::Server;
@@ -32,6 +32,7 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let config = RobotConfig { clock: Clock::Log, ..RobotConfig::new("r1") };
     let mut robot = Robot::connect(&session, config).await?;
     let planner = Planner::new(&session, "default", "main", Duration::from_secs(10))?;
+    let guide = Guide::connect(&session, "default", Some("r1")).await?;
     let (mut acks, mut answers) = (Vec::new(), Vec::new());
     let began = Instant::now();
     for n in 0.. {
@@ -42,7 +43,11 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
         robot.send(message(n, "main", BEAMS)).await?;
         robot.settle().await?;
         acks.push(sent.elapsed());
-        if n > 40 && n % 4 == 0 {
+        if n == 10 {
+            guide.publish(&guide.sentence("this is the gym")).await?;
+        }
+        // After odometry, when the filter rests: what is measured is the way and the answer.
+        if n > 40 && n % 4 == 1 {
             let asked = Instant::now();
             planner.where_is("gym").await?;
             answers.push(asked.elapsed());

@@ -222,7 +222,7 @@ fn reply_to(board: &Board, query: &Query) {
     for key in keys {
         match queries::answer(board, &key, parameters, &payload) {
             Ok(json) => {
-                if let Err(e) = query.reply(&key, json).encoding(ENCODING_JSON).wait() {
+                if let Err(e) = query.reply(&key, json).encoding(ENCODING_JSON).express(true).wait() {
                     warn!(key, "could not reply: {e}");
                 }
             }
