@@ -265,19 +265,6 @@ async fn put(session: &Session, key: &str, json: Vec<u8>) {
 mod tests {
     use super::*;
 
-    fn heard(id: &str, status: HeardStatus) -> Heard {
-        Heard {
-            id: id.into(),
-            status,
-            durable: true,
-            parse: String::new(),
-            grounded: Vec::new(),
-            words: String::new(),
-            question: None,
-            error: None,
-        }
-    }
-
     #[test]
     fn what_is_not_heard_is_said_again_in_order() {
         let (mut unheard, now) = (Unheard::default(), Instant::now());
@@ -286,13 +273,13 @@ mod tests {
         }
         let keys = |due: Vec<(String, Vec<u8>)>| due.into_iter().map(|(key, _)| key).collect::<String>();
         assert_eq!(keys(unheard.due(now)), "");
-        unheard.hear(&heard("b", HeardStatus::NotUnderstood));
-        unheard.hear(&heard("a", HeardStatus::Read));
+        unheard.hear(&Heard::new("b", HeardStatus::NotUnderstood));
+        unheard.hear(&Heard::new("a", HeardStatus::Read));
         assert_eq!(keys(unheard.due(now + 2 * AGAIN)), "ac");
         assert_eq!(keys(unheard.due(now + 3 * AGAIN)), "", "twice as long after that");
         assert_eq!(keys(unheard.due(now + 100 * AGAIN)), "ac");
-        unheard.hear(&heard("a", HeardStatus::Asked));
-        unheard.hear(&heard("c", HeardStatus::Understood));
+        unheard.hear(&Heard::new("a", HeardStatus::Asked));
+        unheard.hear(&Heard::new("c", HeardStatus::Understood));
         assert!(unheard.sentences.is_empty());
     }
 
@@ -300,7 +287,7 @@ mod tests {
     fn what_is_refused_for_now_is_said_again() {
         let refused = |code| {
             let error = Some(toponym_proto::answer::Problem::new(code, "no"));
-            Heard { error, ..heard("a", HeardStatus::Refused) }
+            Heard { error, ..Heard::new("a", HeardStatus::Refused) }
         };
         assert!(!is_final(&refused(ErrorCode::Busy)));
         assert!(is_final(&refused(ErrorCode::NoSuchRobot)));

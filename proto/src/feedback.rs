@@ -26,6 +26,22 @@ pub struct Heard {
     pub error: Option<Problem>,
 }
 
+impl Heard {
+    /// What became of a sentence, without more: not durable, no reading, no words.
+    pub fn new(id: &str, status: HeardStatus) -> Self {
+        Self {
+            id: id.into(),
+            status,
+            durable: false,
+            parse: String::new(),
+            grounded: Vec::new(),
+            words: String::new(),
+            question: None,
+            error: None,
+        }
+    }
+}
+
 /// What became of a sentence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]

@@ -21,7 +21,7 @@ pub fn order_stamp(message: &Message) -> Stamp {
     match message {
         Message::End(_) => Stamp { ns: i64::MAX },
         Message::Say(say) => say.began.unwrap_or_default(),
-        // Enters when it comes: see the map's thread.
+        // Enters when it comes.
         Message::Mend(_) => Stamp::default(),
         Message::Setup(m) => m.header.stamp,
         Message::Odom(m) => m.header.stamp,

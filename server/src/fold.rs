@@ -125,6 +125,11 @@ impl Fold {
         self.now
     }
 
+    /// How long the stream waits for sentences.
+    pub fn hold(&self) -> Duration {
+        self.hold.hold()
+    }
+
     /// By this time of its entries all of the stream that has arrived by now has entered the map.
     pub fn settles_at(&self) -> Duration {
         self.now + self.hold.hold()
@@ -225,25 +230,12 @@ fn split(bytes: &[u8]) -> Option<(&[u8], &[u8])> {
 /// Feedback on a sentence that can't be used.
 pub fn refused(id: &str, problem: Problem) -> Heard {
     let words = format!("I can't use that: {}.", problem.message);
-    Heard { error: Some(problem), words, ..told(id, HeardStatus::Refused) }
+    Heard { error: Some(problem), words, ..Heard::new(id, HeardStatus::Refused) }
 }
 
 /// Feedback on a sentence that is on disk, and was not put anywhere yet.
 fn read(id: &str) -> Heard {
-    Heard { durable: true, ..told(id, HeardStatus::Read) }
-}
-
-fn told(id: &str, status: HeardStatus) -> Heard {
-    Heard {
-        id: id.into(),
-        status,
-        durable: false,
-        parse: String::new(),
-        grounded: Vec::new(),
-        words: String::new(),
-        question: None,
-        error: None,
-    }
+    Heard { durable: true, ..Heard::new(id, HeardStatus::Read) }
 }
 
 #[cfg(test)]

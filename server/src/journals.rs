@@ -10,7 +10,7 @@ use toponym_proto::Message;
 use toponym_proto::keys::check_id;
 
 use crate::fold::Fold;
-use crate::store::Store;
+use crate::store::{Store, free_name};
 
 /// Look at the journals of maps, and mend them
 #[derive(Args, Clone, Debug)]
@@ -170,8 +170,7 @@ fn recover(folder: &Path) -> Result<()> {
     let new = parent.join(format!("{name}.recovered"));
     std::fs::create_dir(&new).with_context(|| new.display().to_string())?;
     rescued.write(Folder(new.clone()))?;
-    let kept = (1..10_000).map(|k| parent.join(format!("{name}.damaged-{k}"))).find(|path| !path.exists());
-    let kept = kept.context("too many damaged folders: remove some")?;
+    let kept = free_name(&parent.join(format!("{name}.damaged")));
     std::fs::rename(folder, &kept)?;
     std::fs::rename(&new, folder)?;
     toponym_journal::disk::sync_folder(parent)?;

@@ -4,7 +4,6 @@
 //! under `{id}.map.imported`.
 
 use std::fs::{self, File};
-use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -145,8 +144,7 @@ impl Store {
     /// Gives a map's folder a name that is no map's, and tells it.
     pub fn set_aside(&self, id: &str) -> Result<PathBuf, StoreError> {
         let path = self.folder.join(id);
-        let free = (1..100_000).map(|k| self.folder.join(format!("{id}.deleted-{k}"))).find(|p| !p.exists());
-        let aside = free.unwrap_or_else(|| self.folder.join(format!("{id}.deleted")));
+        let aside = free_name(&self.folder.join(format!("{id}.deleted")));
         fs::rename(&path, &aside).map_err(io_error(&path))?;
         sync_folder(&self.folder).map_err(io_error(&self.folder))?;
         Ok(aside)
@@ -171,6 +169,16 @@ impl Store {
     }
 }
 
+/// A name that nothing has yet: with `-1`, or the next number, behind it.
+pub fn free_name(path: &Path) -> PathBuf {
+    let numbered = |k: u64| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(format!("-{k}"));
+        PathBuf::from(name)
+    };
+    (1..=u64::from(u32::MAX)).map(numbered).find(|name| !name.exists()).unwrap_or_else(|| path.into())
+}
+
 /// Whether a folder has a journal in it, however damaged.
 fn is_begun(folder: &Path) -> bool {
     let is_its = |entry: io::Result<fs::DirEntry>| {
@@ -182,12 +190,10 @@ fn is_begun(folder: &Path) -> bool {
 /// What stands at the head of each file of a map.
 pub fn identity(fold: &Fold) -> Identity {
     let config = fold.mapper.config();
-    let mut hash = DefaultHasher::new();
-    format!("{config:?}").hash(&mut hash);
     Identity {
         uuid: fold.card.uuid.clone(),
         build: format!("{} {}", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH),
-        config: hash.finish(),
+        config: crc32fast::hash(format!("{config:?}").as_bytes()).into(),
         seed: config.seed,
     }
 }

@@ -6,9 +6,10 @@ use std::time::Duration;
 use toponym_proto::answer::{Ack, ErrorReply, Heard, HeardStatus, Problem, RobotState};
 use toponym_proto::codec::{ENCODING_BINCODE, ENCODING_JSON};
 use toponym_proto::record::RecordReader;
-use toponym_proto::{Clock, End, Header, Keys, Laser, Message, Odom, Pose, Say, Scan, Setup, Stamp};
+use toponym_proto::{Clock, End, Header, Keys, Message, Say, Stamp};
 use toponym_server::config::ServerConfig;
 use toponym_server::serve::Server;
+use toponym_sim::hall;
 use zenoh::Session;
 use zenoh::handlers::FifoChannelHandler;
 use zenoh::pubsub::Subscriber;
@@ -210,40 +211,15 @@ pub fn header(robot: &str, seq: u64) -> Header {
 }
 
 pub fn setup(robot: &str, map: &str) -> Message {
-    let laser = Laser {
-        id: "front".into(),
-        x_m: 0.0,
-        y_m: 0.0,
-        yaw_rad: 0.0,
-        upside_down: false,
-        range_min_m: 0.05,
-        range_max_m: 30.0,
-        ignored_rad: vec![],
-    };
-    Message::Setup(Setup { header: header(robot, 0), map: map.into(), lasers: vec![laser] })
+    hall::setup(header(robot, 0), map)
 }
 
 pub fn odom(robot: &str, seq: u64, x_m: f64) -> Message {
-    let odom_from_body = Pose { x_m, y_m: 3.0, yaw_rad: 0.0 };
-    Message::Odom(Odom { header: header(robot, seq), odom_from_body })
+    hall::odom(header(robot, seq), x_m)
 }
 
 fn scan(robot: &str, seq: u64, x_m: f64) -> Message {
-    let (first_rad, step_rad) = (-2.0_f64, 0.05);
-    let range = |k: i32| {
-        let (sin, cos) = (first_rad + step_rad * f64::from(k)).sin_cos();
-        let along = if cos > 0.0 { (12.0 - x_m) / cos } else { -x_m / cos };
-        let across = if sin > 0.0 { 3.0 / sin } else { -3.0 / sin };
-        along.min(across) as f32
-    };
-    Message::Scan(Scan {
-        header: header(robot, seq),
-        laser: "front".into(),
-        angle_min_rad: first_rad,
-        angle_increment_rad: step_rad,
-        time_increment_s: 0.0,
-        ranges_m: (0..81).map(range).collect(),
-    })
+    hall::scan(header(robot, seq), x_m, 81)
 }
 
 pub fn say(robot: Option<&str>, id: &str, text: &str, began: Option<Stamp>) -> Say {

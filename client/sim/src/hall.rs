@@ -15,24 +15,37 @@ const BEARING_RAD: f64 = 2.0;
 /// the stamps are filled in.
 pub fn message(n: u64, map: &str, beams: u16) -> Message {
     let header = Header { stamp: Stamp { ns: n as i64 * PERIOD_NS }, ..Header::default() };
-    if n == 0 {
-        let laser = Laser {
-            id: "front".into(),
-            x_m: 0.0,
-            y_m: 0.0,
-            yaw_rad: 0.0,
-            upside_down: false,
-            range_min_m: 0.05,
-            range_max_m: 30.0,
-            ignored_rad: vec![],
-        };
-        return Message::Setup(Setup { header, map: map.into(), lasers: vec![laser] });
-    }
     let along_m = (n as f64 * 0.01) % 16.0;
     let x_m = 2.0 + along_m.min(16.0 - along_m);
-    if n % 2 == 1 {
-        return Message::Odom(Odom { header, odom_from_body: Pose { x_m, y_m: 0.0, yaw_rad: 0.0 } });
+    match n {
+        0 => setup(header, map),
+        _ if n % 2 == 1 => odom(header, x_m),
+        _ => scan(header, x_m, beams),
     }
+}
+
+/// The robot presents itself.
+pub fn setup(header: Header, map: &str) -> Message {
+    let laser = Laser {
+        id: "front".into(),
+        x_m: 0.0,
+        y_m: 0.0,
+        yaw_rad: 0.0,
+        upside_down: false,
+        range_min_m: 0.05,
+        range_max_m: 30.0,
+        ignored_rad: vec![],
+    };
+    Message::Setup(Setup { header, map: map.into(), lasers: vec![laser] })
+}
+
+/// Odometry of a robot that stands so far from the wall behind it.
+pub fn odom(header: Header, x_m: f64) -> Message {
+    Message::Odom(Odom { header, odom_from_body: Pose { x_m, y_m: 0.0, yaw_rad: 0.0 } })
+}
+
+/// What it sees from there.
+pub fn scan(header: Header, x_m: f64, beams: u16) -> Message {
     let step_rad = 2.0 * BEARING_RAD / f64::from(beams);
     let range_m = |k: u16| {
         let (sin, cos) = (step_rad * f64::from(k) - BEARING_RAD).sin_cos();

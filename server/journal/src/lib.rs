@@ -32,7 +32,6 @@ pub mod entry;
 mod journal;
 pub mod recover;
 pub mod segment;
-pub mod sim;
 
 pub use checkpoint::Checkpoint;
 pub use disk::{Disk, DiskFile, Folder};
@@ -48,7 +47,7 @@ pub struct Identity {
     pub uuid: String,
     /// Build that wrote the file.
     pub build: String,
-    /// Hash of the filter's settings.
+    /// Hash of the filter's settings, for people who compare.
     pub config: u64,
     /// The filter's seed.
     pub seed: u64,

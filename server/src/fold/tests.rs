@@ -1,6 +1,7 @@
 use super::*;
 use toponym_proto::answer::HeardStatus::{Read, Understood};
-use toponym_proto::{Clock, End, Header, Laser, Odom, Pose, Scan, Setup};
+use toponym_proto::{Clock, End, Header};
+use toponym_sim::hall;
 
 const MS: u64 = 1_000_000;
 
@@ -27,23 +28,11 @@ fn say(id: &str, text: &str, began_ms: i64) -> Event {
 
 /// A drive through a hall of 12 m by 6 m, with two sentences, an entry each 50 ms.
 fn entries() -> Vec<Entry> {
-    let laser = Laser {
-        id: "front".into(),
-        x_m: 0.0,
-        y_m: 0.0,
-        yaw_rad: 0.0,
-        upside_down: false,
-        range_min_m: 0.05,
-        range_max_m: 30.0,
-        ignored_rad: vec![],
-    };
-    let setup = Message::Setup(Setup { header: header(0), map: "main".into(), lasers: vec![laser] });
-    let mut events = vec![Event::Message(setup)];
+    let mut events = vec![Event::Message(hall::setup(header(0), "main"))];
     for step in 0..40_u64 {
         let x_m = 1.5 + 0.2 * step as f64;
-        let odom_from_body = Pose { x_m, y_m: 3.0, yaw_rad: 0.0 };
-        events.push(Event::Message(Message::Odom(Odom { header: header(2 * step + 1), odom_from_body })));
-        events.push(Event::Message(scan(2 * step + 2, x_m)));
+        events.push(Event::Message(hall::odom(header(2 * step + 1), x_m)));
+        events.push(Event::Message(hall::scan(header(2 * step + 2), x_m, 81)));
         match step {
             10 => events.push(say("a", "this is the kitchen", 700)),
             30 => events.push(say("b", "this is the gym", 2_900)),
@@ -54,24 +43,6 @@ fn entries() -> Vec<Entry> {
     events.extend([Event::Gap { boot: 1, to: 90 }, Event::Tick, Event::Hold(200 * MS)]);
     events.extend(std::iter::repeat_n(Event::Tick, 20));
     (1..).zip(events).map(|(k, event)| Entry { at_ns: 50 * MS * k, event }).collect()
-}
-
-fn scan(seq: u64, x_m: f64) -> Message {
-    let (first_rad, step_rad) = (-2.0_f64, 0.05);
-    let range = |k: i32| {
-        let (sin, cos) = (first_rad + step_rad * f64::from(k)).sin_cos();
-        let along = if cos > 0.0 { (12.0 - x_m) / cos } else { -x_m / cos };
-        let across = if sin > 0.0 { 3.0 / sin } else { -3.0 / sin };
-        along.min(across) as f32
-    };
-    Message::Scan(Scan {
-        header: header(seq),
-        laser: "front".into(),
-        angle_min_rad: first_rad,
-        angle_increment_rad: step_rad,
-        time_increment_s: 0.0,
-        ranges_m: (0..81).map(range).collect(),
-    })
 }
 
 /// Folds entries; tells which sentences were heard, and how.

@@ -3,7 +3,7 @@
 
 use arc_swap::ArcSwap;
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicI64, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::Instant;
@@ -44,6 +44,8 @@ pub struct MapView {
     pub unused: Mutex<(u64, Option<String>)>,
     /// Why the journal can't be written, as long as it can't.
     pub trouble: Mutex<Option<String>>,
+    /// Whether its filter has ended: nothing more becomes durable.
+    pub ended: AtomicBool,
     /// By when the filter is to stop, once the server does.
     pub stops_at: Mutex<Option<Instant>>,
     /// Way to the map's journal, and from there to its filter.
@@ -77,6 +79,7 @@ impl MapView {
             held: AtomicUsize::new(0),
             unused: Mutex::default(),
             trouble: Mutex::default(),
+            ended: AtomicBool::new(false),
             stops_at: Mutex::default(),
             work,
         }

@@ -126,8 +126,11 @@ impl Mapping {
         }
         if entries > 0 {
             info!(map = self.view.id, entries, took_s = began.elapsed().as_secs_f64(), "recovered");
-            self.saver.worked(began.elapsed());
             self.view.stamp_ns.store(self.fold.card.stamp_ns, Ordering::Relaxed);
+            // A server that is killed again and again must not pile up segments.
+            if let Err(e) = self.begin_save() {
+                error!(map = self.view.id, "no checkpoint: {e}");
+            }
         }
         self.tell_progress();
         self.show();

@@ -153,8 +153,14 @@ impl Maps {
         let (steps, taken) = sync_channel(STEPS);
         let view = Arc::new(MapView::new(id, &fold.card, durable, fold.mapper.snapshot(), work));
         let newest = tail.last().map_or(fold.now(), |(_, entry)| Duration::from_nanos(entry.at_ns));
+        let held_ns = tail.iter().rev().find_map(|(_, entry)| match entry.event {
+            Event::Hold(ns) => Some(ns),
+            _ => None,
+        });
         // Settings may have changed since; what was taken in before is folded as it was.
-        let _ = view.work.try_send(Work::Take(Event::Hold(self.hold().as_nanos() as u64)));
+        if held_ns.map_or(fold.hold(), Duration::from_nanos) != self.hold() {
+            let _ = view.work.try_send(Work::Take(Event::Hold(self.hold().as_nanos() as u64)));
+        }
         let saved = journal.durable() - tail.len() as u64;
         let mapping = Mapping {
             view: view.clone(),

@@ -8,6 +8,8 @@ use toponym_proto::Message;
 use toponym_proto::record::{Origin, RecordError, RecordReader, RecordWriter};
 use tracing::{error, info, warn};
 
+use crate::store::free_name;
+
 /// A map's record.
 pub struct Recording {
     path: PathBuf,
@@ -25,7 +27,7 @@ impl Recording {
             Ok(writer) => writer,
             Err(why) => {
                 if let Some(why) = why {
-                    let aside = free_name(&path)?;
+                    let aside = free_name(&path);
                     warn!(path = %path.display(), aside = %aside.display(), "moved aside: {why}");
                     fs::rename(&path, aside)?;
                 }
@@ -93,18 +95,6 @@ fn io_error(error: RecordError) -> io::Error {
         RecordError::Io(e) => e,
         other => io::Error::other(other),
     }
-}
-
-/// `path.1`, or the next that is free.
-fn free_name(path: &Path) -> io::Result<PathBuf> {
-    (1..10_000)
-        .map(|k| {
-            let mut name = path.as_os_str().to_owned();
-            name.push(format!(".{k}"));
-            PathBuf::from(name)
-        })
-        .find(|name| !name.exists())
-        .ok_or_else(|| io::Error::other(format!("{}: too many old records", path.display())))
 }
 
 /// Where maps are recorded: one under the name given, others with their id added.
@@ -204,7 +194,7 @@ mod tests {
         record.write(&message("late"));
         record.sync();
         assert_eq!(read(&path), [message("late")]);
-        assert_eq!(read(&folder.join("run.rec.1")).len(), 2);
+        assert_eq!(read(&folder.join("run.rec-1")).len(), 2);
         fs::remove_dir_all(folder).unwrap();
     }
 

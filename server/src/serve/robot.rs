@@ -252,9 +252,11 @@ impl Robot {
         }
     }
 
-    /// Whether all that was handed to the map is on disk.
+    /// Whether all that was handed to the map is on disk, or never will be.
     fn is_drained(&self) -> bool {
-        self.map.as_ref().is_none_or(|map| self.handed.is_none() || *lock(&map.durable) >= self.handed)
+        self.map.as_ref().is_none_or(|map| {
+            self.handed.is_none() || *lock(&map.durable) >= self.handed || map.ended.load(Ordering::Acquire)
+        })
     }
 
     /// Messages handed to the map that are not acknowledged yet.

@@ -71,31 +71,18 @@ impl Scribe {
     /// Works until it is told to stop, or the filter is gone.
     pub fn run(mut self, work: &Receiver<Work>) {
         loop {
-            let mut batch = Vec::new();
-            match work.recv_timeout(TICK) {
-                Ok(first) => batch.push(first),
-                Err(RecvTimeoutError::Timeout) if self.waits_for_time() => {
-                    batch.push(Work::Take(Event::Tick));
-                }
+            let mut next = match work.recv_timeout(TICK) {
+                Ok(first) => Some(first),
+                Err(RecvTimeoutError::Timeout) if self.waits_for_time() => Some(Work::Take(Event::Tick)),
                 Err(RecvTimeoutError::Timeout) => continue,
-                Err(RecvTimeoutError::Disconnected) => batch.push(Work::Stop),
-            }
-            let mut stops = false;
-            let mut steps = Vec::new();
-            let mut bytes = 0;
-            loop {
-                for work in batch.drain(..) {
-                    stops |= matches!(work, Work::Stop);
-                    steps.extend(self.append(work));
-                }
-                bytes = self.journal.uncommitted().max(bytes);
-                if stops || steps.len() >= BATCH || bytes >= BATCH_BYTES {
-                    break;
-                }
-                match work.try_recv() {
-                    Ok(next) => batch.push(next),
-                    Err(_) => break,
-                }
+                Err(RecvTimeoutError::Disconnected) => Some(Work::Stop),
+            };
+            let (mut stops, mut steps) = (false, Vec::new());
+            while let Some(work_now) = next {
+                stops = matches!(work_now, Work::Stop);
+                steps.extend(self.append(work_now));
+                let is_full = steps.len() >= BATCH || self.journal.uncommitted() >= BATCH_BYTES;
+                next = if stops || is_full { None } else { work.try_recv().ok() };
             }
             if self.commit() {
                 self.acknowledge(&steps);
@@ -105,6 +92,7 @@ impl Scribe {
             }
             for step in steps {
                 if self.steps.send(step).is_err() {
+                    self.view.ended.store(true, Ordering::Release);
                     return;
                 }
             }
@@ -121,24 +109,26 @@ impl Scribe {
     }
 
     fn append(&mut self, work: Work) -> Option<Step> {
-        let event = match &work {
-            Work::Take(event) => event.clone(),
-            Work::Mend(mend, _) => Event::Message(Message::Mend(mend.clone())),
-            Work::Save(_) | Work::Stop => Event::Tick,
-        };
+        match work {
+            Work::Take(event) => self.write(event).map(|(index, entry)| Step::Take(index, entry)),
+            Work::Mend(mend, reply) => {
+                let written = self.write(Event::Message(Message::Mend(mend)));
+                written.map(|(index, entry)| Step::Mend(index, entry, reply))
+            }
+            Work::Save(reply) => Some(Step::Save(reply)),
+            Work::Stop => Some(Step::Stop),
+        }
+    }
+
+    /// Puts an entry into the journal; it is durable after the next commit.
+    fn write(&mut self, event: Event) -> Option<(u64, Entry)> {
         let entry = Entry { at_ns: (self.base + self.began.elapsed()).as_nanos() as u64, event };
-        let mut written = || match entry.to_bytes() {
-            Ok(bytes) => Some(self.journal.append(&bytes)),
+        match entry.to_bytes() {
+            Ok(bytes) => Some((self.journal.append(&bytes), entry)),
             Err(e) => {
                 error!(map = self.view.id, "DATA LOSS: can't be written down: {e}");
                 None
             }
-        };
-        match work {
-            Work::Take(_) => Some(Step::Take(written()?, entry)),
-            Work::Mend(_, reply) => Some(Step::Mend(written()?, entry, reply)),
-            Work::Save(reply) => Some(Step::Save(reply)),
-            Work::Stop => Some(Step::Stop),
         }
     }
 

@@ -158,11 +158,11 @@ impl Drive {
 
     /// All is acknowledged, and heard.
     async fn settle(&mut self) {
+        let mut feedback = self.guide.feedback();
         self.robot.settle().await.unwrap();
-        let deadline = Instant::now() + PATIENCE;
         while self.guide.unheard() > 0 {
-            assert!(Instant::now() < deadline, "{} sentences are not heard", self.guide.unheard());
-            tokio::time::sleep(PERIOD).await;
+            let heard = tokio::time::timeout(PATIENCE, feedback.recv()).await;
+            assert!(heard.is_ok(), "{} sentences are not heard", self.guide.unheard());
         }
     }
 }

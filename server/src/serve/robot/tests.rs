@@ -73,6 +73,21 @@ fn a_stop_leaves_what_is_behind_a_gap_to_be_sent_again() {
 }
 
 #[test]
+fn a_robot_leaves_a_map_that_has_ended() {
+    let ((old, _queue), (new, taken)) = (map("old"), map("new"));
+    let mut robot = robot();
+    for message in [setup(0, "old"), odom(1), setup(2, "new")] {
+        robot.push(START, message);
+    }
+    let mut find = |setup: &Setup| Ok(if setup.map == "new" { new.clone() } else { old.clone() });
+    robot.advance(START, false, &mut find);
+    assert!(!robot.is_settled(), "what went to the old map is not on disk");
+    old.ended.store(true, Ordering::Release);
+    robot.advance(START, false, &mut find);
+    assert_eq!((robot.map().map(|map| map.id.as_str()), write_down(&new, &taken)), (Some("new"), 1));
+}
+
+#[test]
 fn what_was_refused_leaves_no_gap() {
     let (view, queue) = map("main");
     let mut robot = robot();

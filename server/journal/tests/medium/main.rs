@@ -2,10 +2,12 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod sim;
+
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
+use sim::{CRASHES, Fault, SimDisk};
 use std::collections::BTreeMap;
-use toponym_journal::sim::{CRASHES, Fault, SimDisk};
 use toponym_journal::{Checkpoint, Entry, Event, Identity, Journal, JournalError, prune};
 
 fn identity() -> Identity {

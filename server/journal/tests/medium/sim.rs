@@ -1,12 +1,12 @@
-//! A medium that fails on purpose, for tests: it forgets what was not synced, in all the ways that
+//! A medium that fails on purpose: it forgets what was not synced, in all the ways that
 //! the assumptions allow, and refuses what it is told to refuse.
 
-use crate::{Disk, DiskFile};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use std::collections::BTreeMap;
 use std::io;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use toponym_journal::{Disk, DiskFile};
 
 /// A sector is written whole or not at all.
 const SECTOR: usize = 512;
