@@ -34,4 +34,4 @@ pub use guide::Guide;
 pub use planner::Planner;
 pub use replay::Replay;
 pub use robot::{Form, Robot, RobotConfig};
-pub use session::{ClientError, endpoint, open};
+pub use session::{ClientError, Connection, endpoint, open};

@@ -2,6 +2,7 @@
 
 use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
+use std::path::PathBuf;
 use std::time::Duration;
 use thiserror::Error;
 use tokio::time::{Instant, sleep_until, timeout_at};
@@ -72,37 +73,120 @@ impl From<zenoh::Error> for ClientError {
 
 /// Where to connect: what was given, else the environment's, else the default endpoint.
 pub fn endpoint(given: Option<&str>) -> String {
-    let environment = std::env::var(CONNECT_ENV).ok().filter(|e| !e.trim().is_empty());
-    given.map(str::to_owned).or(environment).unwrap_or_else(|| DEFAULT_ENDPOINT.into())
+    given.map(str::to_owned).or_else(|| environment(CONNECT_ENV)).unwrap_or_else(|| DEFAULT_ENDPOINT.into())
 }
 
-/// Connects to a server such as `tcp/127.0.0.1:7457`. The session reconnects by itself later on.
+fn environment(name: &str) -> Option<String> {
+    std::env::var(name).ok().filter(|value| !value.trim().is_empty())
+}
+
+/// Where to connect, and as whom.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Connection {
+    /// Such as `tcp/127.0.0.1:7457` or, encrypted, `tls/maps.example.org:7457`.
+    pub endpoint: String,
+    /// User's name, for a server that knows users by passwords.
+    pub user: Option<String>,
+    /// User's password.
+    pub password: Option<String>,
+    /// Certificate of the authority that signed the server's, for `tls`.
+    pub ca: Option<PathBuf>,
+    /// One's own certificate and key, for a server that knows users by these.
+    pub certificate: Option<(PathBuf, PathBuf)>,
+}
+
+impl Connection {
+    /// To an endpoint, as nobody in particular.
+    pub fn to(endpoint: &str) -> Self {
+        Self { endpoint: endpoint.into(), ..Self::default() }
+    }
+
+    /// To an endpoint, as whom the environment says: `TOPONYM_USER` and `TOPONYM_PASSWORD`, `TOPONYM_CA`, `TOPONYM_CERT`
+    /// and `TOPONYM_KEY` (files).
+    pub fn of_environment(endpoint: &str) -> Self {
+        let file = |name| environment(name).map(PathBuf::from);
+        Self {
+            endpoint: endpoint.into(),
+            user: environment("TOPONYM_USER"),
+            password: environment("TOPONYM_PASSWORD"),
+            ca: file("TOPONYM_CA"),
+            certificate: file("TOPONYM_CERT").zip(file("TOPONYM_KEY")),
+        }
+    }
+
+    /// Connects. The session reconnects by itself later on.
+    ///
+    /// # Errors
+    /// [`ClientError::NoServer`] if nobody listens there, or does not let this user in.
+    pub async fn open(&self) -> Result<Session, ClientError> {
+        // Zenoh's text says no more than this, and where in its source it says it.
+        zenoh::open(self.config()?).await.map_err(|_| ClientError::NoServer {
+            endpoint: self.endpoint.clone(),
+            why: match (&self.user, &self.certificate) {
+                (None, None) => {
+                    "nobody answers, or not without a user: start a server with `toponym-server serve`, \
+                                 name another with --connect, or say who you are with --user"
+                        .into()
+                }
+                (Some(user), _) => format!("nobody answers, or {user:?} with this password is not let in"),
+                (None, Some(_)) => "nobody answers, or does not know this certificate".into(),
+            },
+        })
+    }
+
+    fn config(&self) -> Result<zenoh::Config, ClientError> {
+        let endpoints: Vec<&str> = self.endpoint.split(',').collect();
+        let mut settings: Vec<(&str, Value)> = vec![
+            ("mode", json!("client")),
+            // A server that was restarted is there again within a second.
+            (
+                "connect/retry",
+                json!({"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 1.5}),
+            ),
+            ("connect/endpoints", json!(endpoints)),
+            ("scouting/multicast/enabled", json!(false)),
+            ("scouting/gossip/enabled", json!(false)),
+        ];
+        match (&self.user, &self.password) {
+            (Some(user), Some(password)) => settings.extend([
+                ("transport/auth/usrpwd/user", json!(user)),
+                ("transport/auth/usrpwd/password", json!(password)),
+            ]),
+            (None, None) => {}
+            _ => return Err(Invalid::new("user", "a name needs a password, and a password a name").into()),
+        }
+        if let Some(ca) = &self.ca {
+            settings.push(("transport/link/tls/root_ca_certificate", json!(ca)));
+        }
+        if let Some((certificate, key)) = &self.certificate {
+            settings.extend([
+                ("transport/link/tls/enable_mtls", json!(true)),
+                ("transport/link/tls/connect_certificate", json!(certificate)),
+                ("transport/link/tls/connect_private_key", json!(key)),
+            ]);
+        }
+        for file in
+            self.ca.iter().chain(self.certificate.iter().flat_map(|(certificate, key)| [certificate, key]))
+        {
+            std::fs::File::open(file).map_err(|e| Invalid::new("tls", format!("{}: {e}", file.display())))?;
+        }
+        let mut config = zenoh::Config::default();
+        for (key, value) in settings {
+            config.insert_json5(key, &value.to_string()).map_err(|_| {
+                let endpoint = &self.endpoint;
+                Invalid::new("connect", format!("{endpoint:?} is no endpoint such as {DEFAULT_ENDPOINT}"))
+            })?;
+        }
+        Ok(config)
+    }
+}
+
+/// Connects to a server such as `tcp/127.0.0.1:7457`, as whom the [environment says](Connection::of_environment).
 ///
 /// # Errors
-/// [`ClientError::NoServer`] if nobody listens there.
+/// As [`Connection::open`].
 pub async fn open(endpoint: &str) -> Result<Session, ClientError> {
-    let settings: [(&str, Value); 5] = [
-        ("mode", json!("client")),
-        // A server that was restarted is there again within a second.
-        (
-            "connect/retry",
-            json!({"period_init_ms": 200, "period_max_ms": 2000, "period_increase_factor": 1.5}),
-        ),
-        ("connect/endpoints", json!([endpoint])),
-        ("scouting/multicast/enabled", json!(false)),
-        ("scouting/gossip/enabled", json!(false)),
-    ];
-    let mut config = zenoh::Config::default();
-    for (key, value) in settings {
-        config.insert_json5(key, &value.to_string()).map_err(|_| {
-            Invalid::new("connect", format!("{endpoint:?} is no endpoint such as {DEFAULT_ENDPOINT}"))
-        })?;
-    }
-    // Zenoh's text says no more than this, and where in its source it says it.
-    zenoh::open(config).await.map_err(|_| ClientError::NoServer {
-        endpoint: endpoint.into(),
-        why: "nobody answers; start one with `toponym-server serve`, or name another with --connect".into(),
-    })
+    Connection::of_environment(endpoint).open().await
 }
 
 /// Asks on a key until there is an answer. A server that is busy is asked again.

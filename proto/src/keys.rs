@@ -71,6 +71,11 @@ impl Keys {
         Ok(Self { prefix: format!("toponym/v1/{site}") })
     }
 
+    /// Keys of all sites, to ask all servers.
+    pub fn of_any_site() -> Self {
+        Self { prefix: "toponym/v1/*".into() }
+    }
+
     fn robot(&self, robot: &str, rest: &str) -> String {
         format!("{}/robot/{robot}/{rest}", self.prefix)
     }
@@ -111,6 +116,22 @@ impl Keys {
     pub fn state(&self, robot: &str) -> String {
         self.robot(robot, "out/state")
     }
+    /// Selects all of a robot's streams (`*`: of all robots).
+    pub fn inputs(&self, robot: &str) -> String {
+        self.robot(robot, "in/**")
+    }
+    /// Selects all that the server publishes about a robot.
+    pub fn outputs(&self, robot: &str) -> String {
+        self.robot(robot, "out/**")
+    }
+    /// Selects all questions to a map.
+    pub fn asks(&self, map: &str) -> String {
+        format!("{}/map/{map}/ask/*", self.prefix)
+    }
+    /// Selects all that the server publishes about a map.
+    pub fn map_outputs(&self, map: &str) -> String {
+        format!("{}/map/{map}/out/**", self.prefix)
+    }
     /// A question to a map.
     pub fn ask(&self, map: &str, ask: Ask) -> String {
         format!("{}/map/{map}/ask/{}", self.prefix, ask.as_str())
@@ -142,7 +163,7 @@ impl Keys {
 
     /// Selects all robots' streams.
     pub fn all_inputs(&self) -> String {
-        self.robot("*", "in/**")
+        self.inputs("*")
     }
 
     /// Selects everything that can be asked, and more.

@@ -38,8 +38,33 @@ pub struct ServerConfig {
     pub log_speech: bool,
     /// Limits of what is taken in.
     pub limits: Limits,
+    /// Who may do what.
+    pub access: AccessConfig,
     /// The filter of new maps.
     pub mapper: toponym_core::Config,
+}
+
+/// Who may do what, and how it is known who they are.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct AccessConfig {
+    /// Users and their roles; by default `policy.toml` in the data folder. As long as it is not there, whoever connects
+    /// from this machine may do everything, and nobody else anything.
+    pub policy: Option<PathBuf>,
+    /// For endpoints such as `tls/0.0.0.0:7457`.
+    pub tls: Option<TlsConfig>,
+}
+
+/// Certificates, as files in PEM.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct TlsConfig {
+    /// The server's.
+    pub certificate: PathBuf,
+    /// The server's private key.
+    pub key: PathBuf,
+    /// Clients must have a certificate from here; their users have its common name.
+    pub clients_ca: Option<PathBuf>,
 }
 
 impl Default for ServerConfig {
@@ -59,6 +84,7 @@ impl Default for ServerConfig {
             maps_max: 16,
             log_speech: false,
             limits: Limits::default(),
+            access: AccessConfig::default(),
             mapper: toponym_core::Config::default(),
         }
     }
@@ -100,11 +126,31 @@ impl ServerConfig {
         Ok(config)
     }
 
+    /// Whether only this machine can connect.
+    pub fn is_local(&self) -> bool {
+        let local = |endpoint: &String| {
+            let address = endpoint.split('/').nth(1).unwrap_or_default();
+            ["127.", "localhost:", "[::1]:"].iter().any(|start| address.starts_with(start))
+        };
+        self.listen.iter().all(local)
+    }
+
+    /// Where users and their roles are.
+    pub fn policy_path(&self) -> PathBuf {
+        self.access.policy.clone().unwrap_or_else(|| self.data.join("policy.toml"))
+    }
+
     /// Checks the values.
     pub fn check(&self) -> Result<(), ConfigError> {
         check_id("site", &self.site)?;
         if self.listen.is_empty() {
             return Err(Invalid::new("listen", "is empty: nobody could connect").into());
+        }
+        if let Some(tls) = self.listen.iter().find(|l| l.starts_with("tls/"))
+            && self.access.tls.is_none()
+        {
+            let message = format!("has {tls}, but there is no certificate: see [access.tls]");
+            return Err(Invalid::new("listen", message).into());
         }
         for (field, value, min) in [
             ("hold_back_s", self.hold_back_s, 0.0),

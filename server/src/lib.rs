@@ -5,8 +5,10 @@
 //! - [`serve`]: the mapping server over Zenoh; [`config`]: its settings; [`fold`]: a map as a fold of its journal;
 //!   [`store`]: the journals; [`journals`]: their command line.
 //! - [`map`]: recorded logs through the same core, offline; [`demo`]: all of it at once.
+//! - [`access`]: who may do what.
 //! - [`convert`]: between the wire's types and the core's.
 
+pub mod access;
 pub mod config;
 pub mod convert;
 pub mod demo;

@@ -2,8 +2,9 @@
 
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
+use toponym_server::access::{CertArgs, UserArgs};
 use toponym_server::serve::args::{self, LogFormat, ServeArgs};
-use toponym_server::{demo, journals, map};
+use toponym_server::{access, demo, journals, map};
 
 /// Particles make and drop many arrays of a few kilobytes, which the system's allocator scatters.
 #[global_allocator]
@@ -28,6 +29,8 @@ enum Command {
     Map(Box<map::MapArgs>),
     Demo(demo::DemoArgs),
     Journal(journals::JournalArgs),
+    User(UserArgs),
+    Cert(CertArgs),
 }
 
 fn main() -> ExitCode {
@@ -39,6 +42,8 @@ fn main() -> ExitCode {
         }
         Command::Map(map) => map::run(&map),
         Command::Journal(journal) => journals::run(&journal),
+        Command::User(user) => access::edit_users(&user),
+        Command::Cert(cert) => access::make_certificate(&cert),
         Command::Demo(demo) => {
             demo::init_logging();
             block_on(demo::run(demo))

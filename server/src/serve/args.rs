@@ -2,14 +2,19 @@
 
 use super::board::Board;
 use super::queries::save_all;
-use super::{ServeError, Server};
+use super::{ServeError, Server, network};
+use crate::access::Policy;
 use crate::config::ServerConfig;
 use clap::{Args, ValueEnum};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 use tracing::{error, info};
 use tracing_subscriber::EnvFilter;
+
+/// How often it is looked whether users have changed.
+const POLICY_PERIOD: Duration = Duration::from_secs(1);
 
 /// Arguments of `serve`.
 #[derive(Args, Clone, Debug, Default)]
@@ -44,9 +49,13 @@ pub enum LogFormat {
     Json,
 }
 
-/// Logs to stderr from here on; `RUST_LOG` selects, by default what concerns an operator.
+/// What is logged by default: what concerns an operator. Zenoh tells of every connection that fails, and anybody can make
+/// them fail as often as they like.
+const LOGGED: &str = "info,zenoh=error,zenoh_transport=off,zenoh_link=off";
+
+/// Logs to stderr from here on; `RUST_LOG` selects.
 pub fn init_logging(format: LogFormat) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info,zenoh=error"));
+    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
     let logs = tracing_subscriber::fmt()
         .with_env_filter(filter)
         .with_writer(std::io::stderr)
@@ -77,20 +86,54 @@ impl ServeArgs {
     }
 }
 
-/// `serve` as a program: until SIGTERM or ctrl-c.
+/// `serve` as a program: until SIGTERM or ctrl-c; anew when its users have changed.
 pub async fn run(args: ServeArgs) -> anyhow::Result<()> {
     let config = args.settings()?;
     if args.check_config {
+        network::check_tls(&config)?;
+        Policy::read(&config.policy_path())?;
         print!("{}", toml::to_string(&config)?);
         return Ok(());
     }
-    let shutdown = shutdown_signal()?;
-    let server = Server::start(config, args.record).await?;
-    let saving = save_on_hangup(server.board())?;
-    shutdown.await;
-    info!("stopping");
-    saving.abort();
-    Ok(server.stop().await?)
+    let mut shutdown = std::pin::pin!(shutdown_signal()?);
+    loop {
+        let policy = Policy::read(&config.policy_path())?;
+        let server = Server::start(config.clone(), args.record.clone()).await?;
+        let saving = save_on_hangup(server.board())?;
+        let changed = tokio::select! {
+            () = &mut shutdown => false,
+            () = changed(&config, &policy) => true,
+        };
+        info!("{}", if changed { "users have changed: all have to connect again" } else { "stopping" });
+        saving.abort();
+        let stopped = server.stop().await;
+        if !changed {
+            return Ok(stopped?);
+        }
+        if let Err(e) = stopped {
+            // The journals have it.
+            error!("{e}");
+        }
+    }
+}
+
+/// Ready when the policy is another. One that can't be read changes nothing.
+async fn changed(config: &ServerConfig, policy: &Policy) {
+    let (path, mut told) = (config.policy_path(), false);
+    loop {
+        tokio::time::sleep(POLICY_PERIOD).await;
+        match Policy::read(&path) {
+            Ok(new) if new == *policy => told = false,
+            // Whoever removes the file wants no users, but hardly to let everybody on this machine in.
+            Ok(new) if new.local => {}
+            Ok(_) => return,
+            Err(e) if !told => {
+                error!("users stay as they are: {e}");
+                told = true;
+            }
+            Err(_) => {}
+        }
+    }
 }
 
 /// Saves all maps each time the process is told to (SIGHUP).

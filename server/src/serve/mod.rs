@@ -19,7 +19,7 @@ pub mod door;
 mod intake;
 mod mapping;
 mod maps;
-mod network;
+pub mod network;
 mod outbox;
 pub mod queries;
 mod recording;
@@ -30,6 +30,8 @@ pub mod scribe;
 pub use args::{LogFormat, ServeArgs, init_logging, run};
 pub use network::NetworkError;
 
+use crate::access::trial::{Op, TrialError, try_rules};
+use crate::access::{Policy, PolicyError, Role};
 use crate::config::{ConfigError, ServerConfig};
 use crate::store::{Store, StoreError};
 use board::Board;
@@ -62,6 +64,12 @@ pub enum ServeError {
     /// Data folder.
     #[error(transparent)]
     Store(#[from] StoreError),
+    /// Users and roles.
+    #[error(transparent)]
+    Policy(#[from] PolicyError),
+    /// Rules that do not hold.
+    #[error(transparent)]
+    Trial(#[from] TrialError),
     /// Zenoh.
     #[error(transparent)]
     Network(#[from] NetworkError),
@@ -111,7 +119,10 @@ impl Server {
         config.check()?;
         let keys = Keys::new(&config.site).map_err(ConfigError::Invalid)?;
         let store = Arc::new(Store::open(&config.data)?);
-        let session = network::open(&config).await?;
+        let policy = Policy::read(&config.policy_path())?;
+        tell_access(&config, &policy);
+        try_rules(&config, &policy).await?;
+        let session = network::open(&config, &policy).await?;
         let endpoints = session.info().locators().await.iter().map(ToString::to_string).collect();
         let board = Arc::new(Board::new(keys.clone(), &config.site));
         let records = record.map(Recordings::new).transpose()?;
@@ -156,6 +167,32 @@ impl Server {
         let failed =
             joined.map_err(|_| std::io::Error::other("a thread of the server failed: see the log"))?;
         if failed.is_empty() { Ok(()) } else { Err(ServeError::NotSaved(failed)) }
+    }
+}
+
+/// Tells who may do what.
+fn tell_access(config: &ServerConfig, policy: &Policy) {
+    for role in Role::ALL {
+        let users: Vec<&str> = policy
+            .users
+            .iter()
+            .filter(|(_, user)| user.role == role)
+            .map(|(name, _)| name.as_str())
+            .collect();
+        if !users.is_empty() {
+            let may: Vec<&str> = Op::ALL.iter().filter(|op| op.is_for(role)).map(|op| op.told()).collect();
+            info!(users = users.join(" "), "{role:?}s may {}", may.join(", "));
+        }
+    }
+    let path = config.policy_path();
+    if policy.local && !config.is_local() {
+        warn!(
+            policy = %path.display(),
+            "there are no users: only this machine can use the server; `toponym-server user add` makes some"
+        );
+    }
+    if policy.by_password() && !config.is_local() && config.access.tls.is_none() {
+        warn!("passwords are checked, but all else goes over the network in the clear: see [access.tls]");
     }
 }
 

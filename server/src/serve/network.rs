@@ -1,7 +1,10 @@
 //! The Zenoh router inside the server.
 
+use crate::access::{Policy, rules, write_secret};
 use crate::config::ServerConfig;
 use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+use toponym_proto::Keys;
 use zenoh::Session;
 
 /// The network part can't start.
@@ -16,16 +19,40 @@ pub enum NetworkError {
         /// Which endpoint.
         endpoint: String,
     },
+    /// A file of the settings for TLS is not there.
+    #[error("access.tls.{field}: {}: {source}; `toponym-server cert new` makes certificates", path.display())]
+    Tls {
+        /// Which setting.
+        field: &'static str,
+        /// Which file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// Passwords can't be handed to Zenoh.
+    #[error("{}: {source}", path.display())]
+    Passwords {
+        /// The file through which they go.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
     /// Anything else.
     #[error("zenoh: {0}")]
     Zenoh(#[source] zenoh::Error),
 }
 
-/// The router's settings: no discovery of others, no access from outside but by `listen`.
-pub fn zenoh_config(config: &ServerConfig) -> Result<zenoh::Config, NetworkError> {
+/// The router's settings: no discovery of others, no access from outside but by `listen`, and there only what the policy
+/// grants. `passwords`: the file with the users', where they are known by these.
+pub fn zenoh_config(
+    config: &ServerConfig,
+    policy: &Policy,
+    passwords: Option<&Path>,
+) -> Result<zenoh::Config, NetworkError> {
+    let keys = Keys::new(&config.site).map_err(|e| NetworkError::Zenoh(e.into()))?;
     // Longer than any payload that is taken; what is still longer is dropped before it fills memory.
     let message_max_bytes = (2 * config.limits.payload_bytes).max(16 << 20);
-    let settings: [(&str, Value); 8] = [
+    let mut settings: Vec<(&str, Value)> = vec![
         ("mode", json!("router")),
         ("listen/endpoints", json!(config.listen)),
         ("connect/endpoints", json!([])),
@@ -36,7 +63,22 @@ pub fn zenoh_config(config: &ServerConfig) -> Result<zenoh::Config, NetworkError
         // A router that stamps messages makes advanced subscribers drop whatever overtakes.
         ("timestamping/enabled", json!(false)),
         ("transport/link/rx/max_message_size", json!(message_max_bytes)),
+        ("adminspace/enabled", json!(false)),
+        ("access_control", rules(&keys, policy)),
     ];
+    if let Some(path) = passwords {
+        settings.push(("transport/auth/usrpwd/dictionary_file", json!(path)));
+    }
+    if let Some(tls) = &config.access.tls {
+        let mutual = tls.clients_ca.is_some();
+        settings.extend([
+            ("transport/link/tls/listen_certificate", json!(tls.certificate)),
+            ("transport/link/tls/listen_private_key", json!(tls.key)),
+            ("transport/link/tls/root_ca_certificate", json!(tls.clients_ca)),
+            ("transport/link/tls/enable_mtls", json!(mutual)),
+            ("transport/link/tls/close_link_on_expiration", json!(mutual)),
+        ]);
+    }
     let mut zenoh = zenoh::Config::default();
     for (key, value) in settings {
         zenoh.insert_json5(key, &value.to_string()).map_err(NetworkError::Zenoh)?;
@@ -44,9 +86,45 @@ pub fn zenoh_config(config: &ServerConfig) -> Result<zenoh::Config, NetworkError
     Ok(zenoh)
 }
 
-/// Opens the router.
-pub async fn open(config: &ServerConfig) -> Result<Session, NetworkError> {
-    zenoh::open(zenoh_config(config)?).await.map_err(|e| {
+/// Whether the files for TLS are there.
+pub fn check_tls(config: &ServerConfig) -> Result<(), NetworkError> {
+    let Some(tls) = &config.access.tls else {
+        return Ok(());
+    };
+    let files = [
+        ("certificate", Some(&tls.certificate)),
+        ("key", Some(&tls.key)),
+        ("clients_ca", tls.clients_ca.as_ref()),
+    ];
+    for (field, path) in files {
+        if let Some(path) = path {
+            std::fs::File::open(path).map_err(|source| NetworkError::Tls {
+                field,
+                path: path.clone(),
+                source,
+            })?;
+        }
+    }
+    Ok(())
+}
+
+/// Opens the router. The data folder must be there.
+pub async fn open(config: &ServerConfig, policy: &Policy) -> Result<Session, NetworkError> {
+    check_tls(config)?;
+    if !policy.by_password() {
+        return open_with(config, zenoh_config(config, policy, None)?).await;
+    }
+    // Zenoh reads passwords from a file, once.
+    let path = config.data.join("passwords");
+    let failed = |source| NetworkError::Passwords { path: path.clone(), source };
+    write_secret(&path, policy.dictionary().as_bytes()).map_err(failed)?;
+    let opened = open_with(config, zenoh_config(config, policy, Some(&path))?).await;
+    std::fs::remove_file(&path).map_err(failed)?;
+    opened
+}
+
+async fn open_with(config: &ServerConfig, zenoh: zenoh::Config) -> Result<Session, NetworkError> {
+    zenoh::open(zenoh).await.map_err(|e| {
         let text = e.to_string();
         let taken = text.contains("in use") || text.contains("os error 98");
         let endpoint = config.listen.iter().find(|l| text.contains(l.as_str())).or(config.listen.first());

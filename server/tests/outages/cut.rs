@@ -84,7 +84,7 @@ fn away() -> Duration {
 async fn nothing_is_lost(scene: &[(Line, Duration)]) {
     let server = Server::new();
     // The server listens before anybody is let through.
-    drop(crate::drive::connected(&server.endpoint).await);
+    drop(crate::drive::connected(&toponym::Connection::to(&server.endpoint)).await);
     let proxy = Proxy::to(&server.endpoint).await;
     let mut drive = Drive::begin(&proxy.endpoint).await;
     drive.go_for(Duration::from_millis(500)).await;

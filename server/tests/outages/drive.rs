@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
-use toponym::{Guide, Planner, Robot, RobotConfig};
+use toponym::{Connection, Guide, Planner, Robot, RobotConfig};
 use toponym_proto::record::RecordReader;
 use toponym_proto::{Clock, Message, Stamp};
 use toponym_sim::hall::{PERIOD_NS, message};
@@ -46,6 +46,17 @@ impl Server {
             .stdout(Stdio::null())
             .spawn()
             .unwrap()
+    }
+
+    /// `user …`: says who may do what.
+    pub fn user(&self, arguments: &[&str]) {
+        let done = Command::new(env!("CARGO_BIN_EXE_toponym-server"))
+            .args(["user", "--data"])
+            .arg(self.folder.join("data"))
+            .args(arguments)
+            .output()
+            .unwrap();
+        assert!(done.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&done.stderr));
     }
 
     /// kill -9.
@@ -99,7 +110,12 @@ pub struct Drive {
 impl Drive {
     /// Connects to a server, once it listens there.
     pub async fn begin(endpoint: &str) -> Self {
-        let session = connected(endpoint).await;
+        Self::begin_as(&Connection::to(endpoint)).await
+    }
+
+    /// The same as somebody.
+    pub async fn begin_as(connection: &Connection) -> Self {
+        let session = connected(connection).await;
         let config = RobotConfig { clock: Clock::Log, boot: 1, ..RobotConfig::new("r1") };
         Self {
             robot: Robot::connect(&session, config).await.unwrap(),
@@ -168,10 +184,10 @@ impl Drive {
 }
 
 /// A session, once the server listens.
-pub async fn connected(endpoint: &str) -> zenoh::Session {
+pub async fn connected(connection: &Connection) -> zenoh::Session {
     let deadline = Instant::now() + PATIENCE;
     loop {
-        match toponym::open(endpoint).await {
+        match connection.open().await {
             Ok(session) => return session,
             Err(e) => assert!(Instant::now() < deadline, "{e}"),
         }

@@ -7,3 +7,4 @@ mod cut;
 mod drive;
 mod journals;
 mod kill;
+mod users;

@@ -4,7 +4,7 @@ use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::time::Duration;
-use toponym::Planner;
+use toponym::{Connection, Planner};
 use toponym_proto::answer::{Candidate, LabelsReply, WhereReply};
 
 /// Less likely alternatives are left out of the text (not of the JSON).
@@ -50,16 +50,16 @@ pub struct LabelsArgs {
     asked: AskedArgs,
 }
 
-pub async fn find(endpoint: &str, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
-    let session = toponym::open(endpoint).await?;
+pub async fn find(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.where_is(&args.name).await?;
     print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
     Ok(if reply.candidates.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 
-pub async fn labels(endpoint: &str, site: &str, args: &LabelsArgs) -> Result<u8, Failure> {
-    let session = toponym::open(endpoint).await?;
+pub async fn labels(to: &Connection, site: &str, args: &LabelsArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.labels().await?;
     print(&if args.asked.json { json(&reply)? } else { labels_text(&reply) })?;

@@ -2,7 +2,7 @@
 
 use super::{Failure, exit};
 use std::time::Duration;
-use toponym::{ClientError, Planner};
+use toponym::{ClientError, Connection, Planner};
 use toponym_proto::Mend;
 use toponym_proto::answer::ErrorCode;
 
@@ -68,8 +68,8 @@ pub struct DeleteArgs {
     timeout: Duration,
 }
 
-pub async fn delete(endpoint: &str, site: &str, args: &DeleteArgs) -> Result<u8, Failure> {
-    let session = toponym::open(endpoint).await?;
+pub async fn delete(to: &Connection, site: &str, args: &DeleteArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
     Planner::new(&session, site, &args.map, args.timeout)?.delete().await?;
     println!("map {} is deleted; the server keeps its folder aside", args.map);
     Ok(exit::FOUND)
@@ -86,20 +86,20 @@ struct At {
     timeout: Duration,
 }
 
-pub async fn undo(endpoint: &str, site: &str, args: &UndoArgs) -> Result<u8, Failure> {
-    mend(endpoint, site, &args.at, &Mend::Undo { id: args.id.clone() }).await
+pub async fn undo(to: &Connection, site: &str, args: &UndoArgs) -> Result<u8, Failure> {
+    mend(to, site, &args.at, &Mend::Undo { id: args.id.clone() }).await
 }
 
-pub async fn rename(endpoint: &str, site: &str, args: &RenameArgs) -> Result<u8, Failure> {
-    mend(endpoint, site, &args.at, &Mend::Rename { from: args.from.clone(), to: args.to.clone() }).await
+pub async fn rename(to: &Connection, site: &str, args: &RenameArgs) -> Result<u8, Failure> {
+    mend(to, site, &args.at, &Mend::Rename { from: args.from.clone(), to: args.to.clone() }).await
 }
 
-pub async fn forget(endpoint: &str, site: &str, args: &ForgetArgs) -> Result<u8, Failure> {
-    mend(endpoint, site, &args.at, &Mend::Forget { name: args.name.clone() }).await
+pub async fn forget(to: &Connection, site: &str, args: &ForgetArgs) -> Result<u8, Failure> {
+    mend(to, site, &args.at, &Mend::Forget { name: args.name.clone() }).await
 }
 
-async fn mend(endpoint: &str, site: &str, at: &At, mend: &Mend) -> Result<u8, Failure> {
-    let session = toponym::open(endpoint).await?;
+async fn mend(to: &Connection, site: &str, at: &At, mend: &Mend) -> Result<u8, Failure> {
+    let session = to.open().await?;
     let planner = Planner::new(&session, site, &at.map, at.timeout)?;
     match planner.mend(mend).await {
         Ok(mended) => {

@@ -7,8 +7,10 @@ mod status;
 mod talk;
 
 use clap::{Parser, Subcommand};
+use std::path::PathBuf;
 use std::process::ExitCode;
-use toponym::ClientError;
+use toponym::{ClientError, Connection};
+use toponym_proto::Invalid;
 use toponym_proto::keys::DEFAULT_SITE;
 use toponym_sim::args::SimulateArgs;
 
@@ -54,8 +56,47 @@ pub struct Args {
     /// Site, the second part of every key.
     #[arg(long, global = true, default_value = DEFAULT_SITE)]
     site: String,
+    #[command(flatten)]
+    who: Who,
     #[command(subcommand)]
     command: Command,
+}
+
+/// As whom to connect.
+#[derive(Debug, clap::Args)]
+struct Who {
+    /// As this user [env: TOPONYM_USER]; the password is in TOPONYM_PASSWORD, or in a file.
+    #[arg(long, global = true, value_name = "NAME")]
+    user: Option<String>,
+    /// First line is the user's password.
+    #[arg(long, global = true, value_name = "FILE")]
+    password_file: Option<PathBuf>,
+    /// Authority that signed the server's certificate, for tls/… [env: TOPONYM_CA].
+    #[arg(long, global = true, value_name = "FILE")]
+    ca: Option<PathBuf>,
+    /// The user's certificate [env: TOPONYM_CERT].
+    #[arg(long, global = true, value_name = "FILE", requires = "key")]
+    cert: Option<PathBuf>,
+    /// The certificate's key [env: TOPONYM_KEY].
+    #[arg(long, global = true, value_name = "FILE", requires = "cert")]
+    key: Option<PathBuf>,
+}
+
+impl Who {
+    /// To where, as whom: what is given here goes before the environment.
+    fn connection(&self, endpoint: &str) -> Result<Connection, Failure> {
+        let mut to = Connection::of_environment(endpoint);
+        if let Some(file) = &self.password_file {
+            let text = std::fs::read_to_string(file)
+                .map_err(|e| Invalid::new("password-file", format!("{}: {e}", file.display())))
+                .map_err(ClientError::Invalid)?;
+            to.password = text.lines().next().map(str::to_owned);
+        }
+        to.user = self.user.clone().or(to.user);
+        to.ca = self.ca.clone().or(to.ca);
+        to.certificate = self.cert.clone().zip(self.key.clone()).or(to.certificate);
+        Ok(to)
+    }
 }
 
 #[derive(Debug, Subcommand)]
@@ -119,23 +160,26 @@ impl Failure {
 
 /// Runs a command; errors go to standard error.
 pub async fn run(args: Args) -> ExitCode {
-    let endpoint = toponym::endpoint(args.connect.as_deref());
-    let done = match &args.command {
-        Command::Say(say) => talk::say(&endpoint, &args.site, say).await,
-        Command::Where(asked) => find::find(&endpoint, &args.site, asked).await,
-        Command::Labels(asked) => find::labels(&endpoint, &args.site, asked).await,
-        Command::Undo(undo) => mend::undo(&endpoint, &args.site, undo).await,
-        Command::Rename(rename) => mend::rename(&endpoint, &args.site, rename).await,
-        Command::Forget(forget) => mend::forget(&endpoint, &args.site, forget).await,
-        Command::Delete(delete) => mend::delete(&endpoint, &args.site, delete).await,
-        Command::Status(asked) => status::status(&endpoint, &args.site, asked).await,
-        Command::Replay(replay) => play::replay(&endpoint, &args.site, replay).await,
-        Command::Simulate(simulate) => simulated(simulate),
-    };
-    ExitCode::from(done.unwrap_or_else(|failure| {
+    ExitCode::from(done(&args).await.unwrap_or_else(|failure| {
         eprintln!("error: {failure}");
         failure.code()
     }))
+}
+
+async fn done(args: &Args) -> Result<u8, Failure> {
+    let to = args.who.connection(&toponym::endpoint(args.connect.as_deref()))?;
+    match &args.command {
+        Command::Say(say) => talk::say(&to, &args.site, say).await,
+        Command::Where(asked) => find::find(&to, &args.site, asked).await,
+        Command::Labels(asked) => find::labels(&to, &args.site, asked).await,
+        Command::Undo(undo) => mend::undo(&to, &args.site, undo).await,
+        Command::Rename(rename) => mend::rename(&to, &args.site, rename).await,
+        Command::Forget(forget) => mend::forget(&to, &args.site, forget).await,
+        Command::Delete(delete) => mend::delete(&to, &args.site, delete).await,
+        Command::Status(asked) => status::status(&to, &args.site, asked).await,
+        Command::Replay(replay) => play::replay(&to, &args.site, replay).await,
+        Command::Simulate(simulate) => simulated(simulate),
+    }
 }
 
 fn simulated(args: &SimulateArgs) -> Result<u8, Failure> {

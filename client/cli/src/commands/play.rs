@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use toponym::log::{self, Narration, Options};
 use toponym::replay::{Progress, Replayed};
-use toponym::{Replay, RobotConfig};
+use toponym::{Connection, Replay, RobotConfig};
 use toponym_proto::Clock;
 
 /// Arguments of `replay`.
@@ -55,11 +55,11 @@ fn speed(text: &str) -> Result<Speed, String> {
     }
 }
 
-pub async fn replay(endpoint: &str, site: &str, args: &ReplayArgs) -> Result<u8, Failure> {
+pub async fn replay(to: &Connection, site: &str, args: &ReplayArgs) -> Result<u8, Failure> {
     let narration = args.narration.as_deref().map(Narration::read).transpose()?.unwrap_or_default();
     let options = Options { robot: args.robot.clone(), map: args.map.clone(), boot: 0 };
     let mut log = log::merged(log::open(&args.log, &options)?, &narration);
-    let session = toponym::open(endpoint).await?;
+    let session = to.open().await?;
     let mut robot = RobotConfig::new(&args.robot);
     robot.site = site.into();
     robot.clock = Clock::Log;

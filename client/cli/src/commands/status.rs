@@ -3,7 +3,7 @@
 use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
-use toponym::Planner;
+use toponym::{Connection, Planner};
 use toponym_proto::answer::{Info, MapWork, RobotState};
 
 /// Arguments of `status`.
@@ -20,8 +20,8 @@ pub struct StatusArgs {
     timeout: Duration,
 }
 
-pub async fn status(endpoint: &str, site: &str, args: &StatusArgs) -> Result<u8, Failure> {
-    let session = toponym::open(endpoint).await?;
+pub async fn status(to: &Connection, site: &str, args: &StatusArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
     let asked = Instant::now();
     let info = Planner::new(&session, site, "main", args.timeout)?.info().await?;
     let took = asked.elapsed();

@@ -3,7 +3,7 @@
 use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::time::Duration;
-use toponym::{Guide, Planner};
+use toponym::{Connection, Guide, Planner};
 use toponym_proto::Say;
 use toponym_proto::answer::{GraphReply, Heard, HeardStatus};
 
@@ -42,8 +42,8 @@ pub struct SayArgs {
     timeout: Duration,
 }
 
-pub async fn say(endpoint: &str, site: &str, args: &SayArgs) -> Result<u8, Failure> {
-    let session = toponym::open(endpoint).await?;
+pub async fn say(to: &Connection, site: &str, args: &SayArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
     let mut guide = Guide::connect(&session, site, args.robot.as_deref()).await?;
     guide.speaker.clone_from(&args.speaker);
     let say = Say { answers: args.answers.clone(), ..guide.sentence(&args.text) };
