@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 pub use crate::feedback::{
-    Ack, Clocks, Counts, Done, Grounded, Heard, HeardStatus, Info, Jump, MapWork, Mended, PoseOut, PoseState,
-    RobotState,
+    Ack, Clocks, Counts, Done, Grounded, Heard, HeardStatus, Info, Jump, Machine, MapWork, Mended, PoseOut,
+    PoseState, RobotState,
 };
 
 /// `v` of every answer.

@@ -195,6 +195,44 @@ pub struct Info {
     /// Maps that are not served, and why.
     #[serde(default)]
     pub broken: Vec<Problem>,
+    /// How the machine does.
+    #[serde(default)]
+    pub machine: Machine,
+}
+
+impl Info {
+    /// What is not as it should be, in words; nothing: all is well.
+    pub fn troubles(&self) -> Vec<String> {
+        let broken = self.broken.iter().map(|problem| problem.message.clone());
+        let journal = |map: &MapWork| Some(format!("map {}: {}", map.map, map.trouble.as_ref()?));
+        let robot = |robot: &RobotState| {
+            let counts = &robot.counts;
+            let mut why: Vec<String> =
+                [(counts.lost, "lost"), (counts.refused, "refused"), (counts.unused, "of no use")]
+                    .into_iter()
+                    .filter(|(count, _)| *count > 0)
+                    .map(|(count, what)| format!("{count} messages {what}"))
+                    .collect();
+            why.extend(robot.error.as_ref().map(|e| e.message.clone()));
+            why.extend(robot.unused.clone());
+            (!why.is_empty()).then(|| format!("robot {}: {}", robot.robot, why.join("; ")))
+        };
+        broken
+            .chain(self.work.iter().filter_map(journal))
+            .chain(self.robots.iter().filter_map(robot))
+            .collect()
+    }
+}
+
+/// How the machine does on which a server runs; none where it can't be told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Machine {
+    /// Bytes that may still be written where the maps are.
+    pub disk_left_bytes: Option<u64>,
+    /// Bytes of memory that the server uses.
+    pub memory_bytes: Option<u64>,
+    /// Bytes of memory that are left to everybody.
+    pub memory_left_bytes: Option<u64>,
 }
 
 /// How a map's journal and filter do.
@@ -208,6 +246,12 @@ pub struct MapWork {
     pub held: u64,
     /// Bytes that are on their way to the filter.
     pub backlog_bytes: u64,
+    /// How far the filter is behind the journal, s.
+    #[serde(default)]
+    pub lag_s: f64,
+    /// How long the journal's last write to disk took, s.
+    #[serde(default)]
+    pub sync_s: f64,
     /// Why the journal can't be written, as long as it can't.
     pub trouble: Option<String>,
 }

@@ -14,6 +14,8 @@ pub struct ServerConfig {
     pub site: String,
     /// Zenoh endpoints to listen on. Beyond loopback everybody on the network can connect.
     pub listen: Vec<String>,
+    /// Address of `/healthz` and `/metrics` (Prometheus), such as `127.0.0.1:7458`; everybody who reaches it may read them.
+    pub http: Option<String>,
     /// Folder of the maps: a journal and checkpoints of each.
     pub data: PathBuf,
     /// How long a robot's stream waits for sentences that come over other connections.
@@ -72,6 +74,7 @@ impl Default for ServerConfig {
         Self {
             site: DEFAULT_SITE.into(),
             listen: vec![DEFAULT_ENDPOINT.into()],
+            http: None,
             data: "./toponym-data".into(),
             hold_back_s: 0.5,
             gap_wait_s: 10.0,

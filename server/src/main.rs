@@ -3,7 +3,7 @@
 use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use toponym_server::access::{CertArgs, UserArgs};
-use toponym_server::serve::args::{self, LogFormat, ServeArgs};
+use toponym_server::serve::{self, LogFormat, ServeArgs};
 use toponym_server::{access, demo, journals, map};
 
 /// Particles make and drop many arrays of a few kilobytes, which the system's allocator scatters.
@@ -37,8 +37,8 @@ fn main() -> ExitCode {
     let cli = Cli::parse();
     let done = match cli.command {
         Command::Serve(serve) => {
-            args::init_logging(cli.log_format);
-            block_on(args::run(serve))
+            serve::init_logging(cli.log_format);
+            block_on(serve::run(serve))
         }
         Command::Map(map) => map::run(&map),
         Command::Journal(journal) => journals::run(&journal),

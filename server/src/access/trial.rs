@@ -243,7 +243,7 @@ impl Ground {
                 .timeout(patience)
                 .callback(move |reply| {
                     if reply.result().is_ok() {
-                        note()
+                        note();
                     }
                 })
                 .await?;

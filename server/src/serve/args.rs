@@ -5,13 +5,11 @@ use super::queries::save_all;
 use super::{ServeError, Server, network};
 use crate::access::Policy;
 use crate::config::ServerConfig;
-use clap::{Args, ValueEnum};
-use std::io::IsTerminal;
+use clap::Args;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use tracing::{error, info};
-use tracing_subscriber::EnvFilter;
 
 /// How often it is looked whether users have changed.
 const POLICY_PERIOD: Duration = Duration::from_secs(1);
@@ -34,37 +32,12 @@ pub struct ServeArgs {
     /// Folder of the maps, instead of the settings'
     #[arg(long, value_name = "FOLDER")]
     pub data: Option<PathBuf>,
+    /// Tell how the server does at this address: /healthz, and /metrics for Prometheus
+    #[arg(long, value_name = "ADDRESS")]
+    pub http: Option<String>,
     /// Log what people say, too
     #[arg(long)]
     pub log_speech: bool,
-}
-
-/// How logs are written to stderr.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
-pub enum LogFormat {
-    /// Lines for people.
-    #[default]
-    Text,
-    /// One JSON object a line.
-    Json,
-}
-
-/// What is logged by default: what concerns an operator. Zenoh tells of every connection that fails, and anybody can make
-/// them fail as often as they like.
-const LOGGED: &str = "info,zenoh=error,zenoh_transport=off,zenoh_link=off";
-
-/// Logs to stderr from here on; `RUST_LOG` selects.
-pub fn init_logging(format: LogFormat) {
-    let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(LOGGED));
-    let logs = tracing_subscriber::fmt()
-        .with_env_filter(filter)
-        .with_writer(std::io::stderr)
-        .with_ansi(std::io::stderr().is_terminal());
-    // An error means that somebody logs already.
-    let _ = match format {
-        LogFormat::Text => logs.try_init(),
-        LogFormat::Json => logs.json().try_init(),
-    };
 }
 
 impl ServeArgs {
@@ -80,6 +53,7 @@ impl ServeArgs {
         if let Some(data) = &self.data {
             config.data.clone_from(data);
         }
+        config.http = self.http.clone().or(config.http);
         config.log_speech |= self.log_speech;
         config.check()?;
         Ok(config)

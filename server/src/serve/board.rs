@@ -3,6 +3,7 @@
 
 use arc_swap::ArcSwap;
 use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
@@ -38,6 +39,12 @@ pub struct MapView {
     pub backlog_bytes: AtomicUsize,
     /// Number of the last entry that the filter has taken in.
     pub taken: AtomicU64,
+    /// Time of that entry, and of the newest on disk, on the journal's clock, ns.
+    pub taken_at_ns: AtomicU64,
+    /// See `taken_at_ns`.
+    pub written_at_ns: AtomicU64,
+    /// How long the journal's last write to disk took, ns.
+    pub sync_ns: AtomicU64,
     /// Messages that are held back until time passes.
     pub held: AtomicUsize,
     /// Scans that were of no use, and why the newest was not.
@@ -76,6 +83,9 @@ impl MapView {
             durable: Mutex::new(durable),
             backlog_bytes: AtomicUsize::new(0),
             taken: AtomicU64::new(0),
+            taken_at_ns: AtomicU64::new(0),
+            written_at_ns: AtomicU64::new(0),
+            sync_ns: AtomicU64::new(0),
             held: AtomicUsize::new(0),
             unused: Mutex::default(),
             trouble: Mutex::default(),
@@ -119,13 +129,19 @@ pub struct Board {
     pub overrun: AtomicU64,
     /// Bytes of messages that wait to be looked at.
     pub queued_bytes: AtomicUsize,
+    /// Folder of the maps.
+    pub data: PathBuf,
+    /// When the intake last went round, ms since the server began.
+    pub beat_ms: AtomicU64,
+    /// When the server began.
+    pub began: Instant,
     /// Way to the intake, for commands that it carries out; none before it runs.
     pub control: OnceLock<SyncSender<Arrival>>,
 }
 
 impl Board {
     /// An empty one.
-    pub fn new(keys: Keys, site: &str) -> Self {
+    pub fn new(keys: Keys, site: &str, data: &Path) -> Self {
         Self {
             keys,
             site: site.into(),
@@ -135,6 +151,9 @@ impl Board {
             latest: Mutex::default(),
             overrun: AtomicU64::new(0),
             queued_bytes: AtomicUsize::new(0),
+            data: data.into(),
+            beat_ms: AtomicU64::new(0),
+            began: Instant::now(),
             control: OnceLock::new(),
         }
     }

@@ -97,6 +97,7 @@ impl Intake {
     pub fn run(mut self, arrivals: &Receiver<Arrival>) -> Vec<String> {
         let mut open = true;
         while open {
+            self.board.beat_ms.store(self.board.began.elapsed().as_millis() as u64, Ordering::Relaxed);
             let mut next = arrivals.recv_timeout(TICK);
             for taken in 1..=BATCH {
                 match next {

@@ -139,6 +139,7 @@ impl Mapping {
     /// The journal's thread passes the time while something is held.
     fn tell_progress(&self) {
         self.view.held.store(self.fold.held(), Ordering::Relaxed);
+        self.view.taken_at_ns.store(self.fold.now().as_nanos() as u64, Ordering::Relaxed);
         self.view.taken.store(self.index, Ordering::Release);
     }
 

@@ -17,6 +17,7 @@ pub mod args;
 pub mod board;
 pub mod door;
 mod intake;
+mod log;
 mod mapping;
 mod maps;
 pub mod network;
@@ -26,8 +27,10 @@ mod recording;
 mod robot;
 mod saver;
 pub mod scribe;
+mod watch;
 
-pub use args::{LogFormat, ServeArgs, init_logging, run};
+pub use args::{ServeArgs, run};
+pub use log::{LogFormat, init_logging};
 pub use network::NetworkError;
 
 use crate::access::trial::{Op, TrialError, try_rules};
@@ -42,6 +45,7 @@ use outbox::Outbox;
 use recording::Recordings;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
 use std::time::Duration;
 use toponym_proto::Keys;
@@ -54,6 +58,9 @@ use zenoh_ext::{AdvancedSubscriberBuilderExt, HistoryConfig, RecoveryConfig};
 
 /// How long a robot's cache may take to answer.
 const HISTORY_WAIT: Duration = Duration::from_secs(2);
+
+/// Queries that wait to be told that there are too many.
+const REFUSED_MAX: usize = 4096;
 
 /// The server can't start or stop.
 #[derive(Debug, thiserror::Error)]
@@ -96,6 +103,7 @@ pub struct Server {
     outbox: Outbox,
     publisher: JoinHandle<()>,
     _token: zenoh::liveliness::LivelinessToken,
+    watchers: Vec<tokio::task::JoinHandle<()>>,
     endpoints: Vec<String>,
 }
 
@@ -124,8 +132,12 @@ impl Server {
         try_rules(&config, &policy).await?;
         let session = network::open(&config, &policy).await?;
         let endpoints = session.info().locators().await.iter().map(ToString::to_string).collect();
-        let board = Arc::new(Board::new(keys.clone(), &config.site));
+        let board = Arc::new(Board::new(keys.clone(), &config.site, &config.data));
         let records = record.map(Recordings::new).transpose()?;
+        let mut watchers = Vec::new();
+        if let Some(address) = &config.http {
+            watchers.push(watch::serve_http(board.clone(), address).await?);
+        }
         let (outbox, publisher) = Outbox::start(board.clone(), session.clone())?;
         let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, records);
         maps.start_saved()?;
@@ -136,7 +148,9 @@ impl Server {
         subscribe(&session, &keys, &door).await?;
         answer_queries(&session, &board).await?;
         let token = session.liveliness().declare_token(keys.alive(&session.zid().to_string())).await?;
-        let server = Self { session, board, door, intake, outbox, publisher, _token: token, endpoints };
+        watchers.push(watch::tell_systemd(board.clone()));
+        let server =
+            Self { session, board, door, intake, outbox, publisher, _token: token, watchers, endpoints };
         info!(site = server.board.site, endpoints = server.endpoints.join(" "), "listening");
         Ok(server)
     }
@@ -154,7 +168,10 @@ impl Server {
     /// Takes in what has arrived, saves all maps, closes the network. A map that could not be saved
     /// is an error, told when all is closed.
     pub async fn stop(self) -> Result<(), ServeError> {
-        let Self { session, door, intake, outbox, publisher, .. } = self;
+        let Self { session, door, intake, outbox, publisher, watchers, .. } = self;
+        for watcher in &watchers {
+            watcher.abort();
+        }
         let done = tokio::task::spawn_blocking(move || {
             door.close();
             let intake = intake.join();
@@ -214,10 +231,17 @@ async fn subscribe(session: &Session, keys: &Keys, door: &Door) -> Result<(), ze
         .await
 }
 
-async fn answer_queries(session: &Session, board: &Arc<Board>) -> Result<(), zenoh::Error> {
+async fn answer_queries(session: &Session, board: &Arc<Board>) -> Result<(), ServeError> {
     let board = board.clone();
     let permits = queries::Permits::default();
     let runtime = tokio::runtime::Handle::current();
+    // Not by the callback: a reply waits for who reads slowly, and with it all who are read by the same thread.
+    let (refuse, refused) = sync_channel::<Query>(REFUSED_MAX);
+    std::thread::Builder::new().name("refuse".into()).spawn(move || {
+        while let Ok(query) = refused.recv() {
+            reply_problem(&query, Problem::new(ErrorCode::Busy, "too many queries: try again"));
+        }
+    })?;
     session
         .declare_queryable(board.keys.everything())
         .callback(move |query| match permits.take(query.key_expr().as_str()) {
@@ -228,10 +252,12 @@ async fn answer_queries(session: &Session, board: &Arc<Board>) -> Result<(), zen
                     drop(permit);
                 });
             }
-            None => reply_problem(&query, Problem::new(ErrorCode::Busy, "too many queries: try again")),
+            // One that finds no room is not answered, and asked again.
+            None => drop(refuse.try_send(query)),
         })
         .background()
-        .await
+        .await?;
+    Ok(())
 }
 
 /// Replies to a query on each key it selects.

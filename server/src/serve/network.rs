@@ -64,7 +64,15 @@ pub fn zenoh_config(
         ("timestamping/enabled", json!(false)),
         ("transport/link/rx/max_message_size", json!(message_max_bytes)),
         ("adminspace/enabled", json!(false)),
+        // Whoever connects and then says nothing must not keep others out.
+        ("transport/unicast/accept_timeout", json!(3000)),
+        ("transport/unicast/accept_pending", json!(10_000)),
         ("access_control", rules(&keys, policy)),
+        ("qos/network", replies()),
+        // Who does not read a long answer for so long, us, is disconnected, and connects again by itself. Meanwhile Zenoh's one
+        // thread that sends may wait for them, too, and with it all others.
+        ("transport/link/tx/queue/congestion_control/block/wait_before_close", json!(90_000)),
+        ("transport/link/tx/queue/size/data_low", json!(16)),
     ];
     if let Some(path) = passwords {
         settings.push(("transport/auth/usrpwd/dictionary_file", json!(path)));
@@ -84,6 +92,23 @@ pub fn zenoh_config(
         zenoh.insert_json5(key, &value.to_string()).map_err(NetworkError::Zenoh)?;
     }
     Ok(zenoh)
+}
+
+/// Replies go as their queries came, and those may ask to be waited for, in the queue of all else. So queries are changed on
+/// their way in: long answers wait for those who read slowly, in a queue of their own; short ones do not wait.
+fn replies() -> Value {
+    let short = ["map/*/ask/where", "map/*/ask/labels", "robot/*/out/*", "info", "time"];
+    let short: Vec<String> = short.iter().map(|key| format!("toponym/v1/*/{key}")).collect();
+    json!([
+        {
+            "id": "long", "messages": ["query"], "flows": ["ingress"], "key_exprs": ["**"],
+            "overwrite": {"priority": "data_low", "congestion_control": "block"}
+        },
+        {
+            "id": "short", "messages": ["query"], "flows": ["ingress"], "key_exprs": short,
+            "overwrite": {"priority": "data", "congestion_control": "drop"}
+        },
+    ])
 }
 
 /// Whether the files for TLS are there.

@@ -7,7 +7,7 @@ use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
 use toponym_proto::codec::ENCODING_JSON;
 use tracing::{debug, error, warn};
-use zenoh::qos::CongestionControl;
+use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
 use super::board::{Board, MapView, lock};
@@ -17,7 +17,7 @@ use super::queries;
 const QUEUE: usize = 1024;
 
 enum Parcel {
-    Payload { key: String, json: Vec<u8>, must_arrive: bool },
+    Payload { key: String, json: Vec<u8>, prompt: bool },
     Graph(Arc<MapView>),
     Stop,
 }
@@ -44,24 +44,24 @@ impl Outbox {
     pub fn stream<T: Serialize>(&self, key: String, value: &T) {
         if let Some(json) = self.keep(&key, value)
             && let Err(TrySendError::Full(_)) =
-                self.queue.try_send(Parcel::Payload { key, json, must_arrive: false })
+                self.queue.try_send(Parcel::Payload { key, json, prompt: false })
         {
             debug!("publishing falls behind: a pose is left out");
         }
     }
 
-    /// What must arrive (feedback, states): waits for room.
+    /// What others wait for (feedback, states): waits for room here.
     pub fn send<T: Serialize>(&self, key: String, value: &T) {
         if let Some(json) = self.keep(&key, value) {
             // An error means that the server stops.
-            let _ = self.queue.send(Parcel::Payload { key, json, must_arrive: true });
+            let _ = self.queue.send(Parcel::Payload { key, json, prompt: true });
         }
     }
 
-    /// What must arrive but concerns nobody who comes later.
+    /// What others wait for but concerns nobody who comes later.
     pub fn tell<T: Serialize>(&self, key: String, value: &T) {
         if let Some(json) = written(&key, value) {
-            let _ = self.queue.send(Parcel::Payload { key, json, must_arrive: true });
+            let _ = self.queue.send(Parcel::Payload { key, json, prompt: true });
         }
     }
 
@@ -88,8 +88,8 @@ fn written<T: Serialize>(key: &str, value: &T) -> Option<Vec<u8>> {
 
 fn publish_all(board: &Board, session: &Session, parcels: &Receiver<Parcel>) {
     while let Ok(parcel) = parcels.recv() {
-        let (key, json, must_arrive) = match parcel {
-            Parcel::Payload { key, json, must_arrive } => (key, json, must_arrive),
+        let (key, json, prompt) = match parcel {
+            Parcel::Payload { key, json, prompt } => (key, json, prompt),
             Parcel::Graph(map) => match queries::graph(&map) {
                 Ok(json) => (board.keys.graph(&map.id), json, false),
                 Err(problem) => {
@@ -99,9 +99,10 @@ fn publish_all(board: &Board, session: &Session, parcels: &Receiver<Parcel>) {
             },
             Parcel::Stop => return,
         };
-        let congestion = if must_arrive { CongestionControl::Block } else { CongestionControl::Drop };
-        let put = session.put(&key, json).encoding(ENCODING_JSON).congestion_control(congestion);
-        if let Err(e) = put.express(must_arrive).wait() {
+        // Nobody is waited for: a robot or guide whose connection is full asks or says again. Long answers, which wait,
+        // have another queue.
+        let put = session.put(&key, json).encoding(ENCODING_JSON).congestion_control(CongestionControl::Drop);
+        if let Err(e) = put.priority(Priority::DataHigh).express(prompt).wait() {
             warn!(key, "could not be published: {e}");
         }
     }

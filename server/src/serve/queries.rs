@@ -3,16 +3,13 @@
 
 use serde::Serialize;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use toponym_core::answers::snapshot::asks_of_robot;
 use toponym_core::effects::TrackState;
 use toponym_core::{Answer, Query, Snapshot};
-use toponym_proto::answer::{
-    ANSWER_VERSION, Clocks, Done, ErrorCode, Info, MapWork, Mended, Problem, RobotState,
-};
+use toponym_proto::answer::{ANSWER_VERSION, Clocks, Done, ErrorCode, Mended, Problem, RobotState};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
 use toponym_proto::{Limits, Mend, Message, Stamp};
@@ -20,6 +17,7 @@ use toponym_proto::{Limits, Mend, Message, Stamp};
 use super::board::{Board, MapView, lock};
 use super::door::Arrival;
 use super::scribe::Work;
+use super::watch;
 use crate::convert;
 
 /// How long a command waits for a map that is busy.
@@ -228,26 +226,7 @@ fn resolution_m(text: &str) -> Result<f64, Problem> {
 
 fn info(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
     let [] = take(arguments.clone(), [])?;
-    json(&Info {
-        v: ANSWER_VERSION,
-        server: concat!("toponym-server ", env!("CARGO_PKG_VERSION")).into(),
-        site: board.site.clone(),
-        maps: board.maps.load().values().map(|map| map.identity(&map.snapshot.load())).collect(),
-        robots: lock(&board.robots).values().cloned().collect(),
-        overrun: board.overrun.load(Ordering::Relaxed),
-        work: board.maps.load().values().map(|map| work(map)).collect(),
-        broken: lock(&board.broken).values().cloned().collect(),
-    })
-}
-
-fn work(map: &MapView) -> MapWork {
-    MapWork {
-        map: map.id.clone(),
-        robot: map.robot.clone(),
-        held: map.held.load(Ordering::Relaxed) as u64,
-        backlog_bytes: map.backlog_bytes.load(Ordering::Relaxed) as u64,
-        trouble: lock(&map.trouble).clone(),
-    }
+    json(&watch::info(board))
 }
 
 fn time(board: &Board, arguments: Arguments) -> Result<Vec<u8>, Problem> {

@@ -84,7 +84,11 @@ impl Scribe {
                 let is_full = steps.len() >= BATCH || self.journal.uncommitted() >= BATCH_BYTES;
                 next = if stops || is_full { None } else { work.try_recv().ok() };
             }
+            let began = Instant::now();
             if self.commit() {
+                if !steps.is_empty() {
+                    self.view.sync_ns.store(began.elapsed().as_nanos() as u64, Ordering::Relaxed);
+                }
                 self.acknowledge(&steps);
             } else {
                 // What could not be written was acknowledged to nobody: it comes again.
@@ -134,6 +138,13 @@ impl Scribe {
 
     /// Tells how far the robot's stream is on disk.
     fn acknowledge(&self, steps: &[Step]) {
+        let last = steps.iter().rev().find_map(|step| match step {
+            Step::Take(_, entry) | Step::Mend(_, entry, _) => Some(entry.at_ns),
+            Step::Save(_) | Step::Stop => None,
+        });
+        if let Some(at_ns) = last {
+            self.view.written_at_ns.store(at_ns, Ordering::Relaxed);
+        }
         let newest = steps.iter().filter_map(|step| match step {
             Step::Take(_, entry) => entry.watermark(),
             _ => None,

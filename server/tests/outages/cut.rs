@@ -11,9 +11,11 @@ use tokio::sync::watch;
 
 /// What becomes of what is sent.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Line {
+pub enum Line {
     /// It arrives.
     Open,
+    /// What the server sends waits: its client does not listen.
+    Deaf,
     /// It waits: neither side is told.
     Stalled,
     /// Connections end, and new ones are refused.
@@ -21,13 +23,13 @@ enum Line {
 }
 
 /// A line between robot and server.
-struct Proxy {
-    line: watch::Sender<Line>,
-    endpoint: String,
+pub struct Proxy {
+    pub line: watch::Sender<Line>,
+    pub endpoint: String,
 }
 
 impl Proxy {
-    async fn to(server: &str) -> Self {
+    pub async fn to(server: &str) -> Self {
         let server: SocketAddr = server.strip_prefix("tcp/").unwrap().parse().unwrap();
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let endpoint = format!("tcp/{}", listener.local_addr().unwrap());
@@ -38,8 +40,8 @@ impl Proxy {
                     && let Ok(server) = TcpStream::connect(server).await
                 {
                     let (from, to) = (client.into_split(), server.into_split());
-                    tokio::spawn(carry(from.0, to.1, state.clone()));
-                    tokio::spawn(carry(to.0, from.1, state.clone()));
+                    tokio::spawn(carry(from.0, to.1, state.clone(), false));
+                    tokio::spawn(carry(to.0, from.1, state.clone(), true));
                 }
             }
         });
@@ -52,19 +54,20 @@ async fn carry(
     mut from: tokio::net::tcp::OwnedReadHalf,
     mut to: tokio::net::tcp::OwnedWriteHalf,
     mut line: watch::Receiver<Line>,
+    is_to_client: bool,
 ) {
     let mut bytes = vec![0; 1 << 14];
     loop {
         let state = *line.borrow_and_update();
         let read = match state {
             Line::Cut => return,
-            Line::Stalled => {
+            Line::Stalled | Line::Deaf if state == Line::Stalled || is_to_client => {
                 if line.changed().await.is_err() {
                     return;
                 }
                 continue;
             }
-            Line::Open => tokio::select! {
+            Line::Open | Line::Deaf | Line::Stalled => tokio::select! {
                 read = from.read(&mut bytes) => read,
                 changed = line.changed() => if changed.is_ok() { continue } else { return },
             },

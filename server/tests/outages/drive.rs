@@ -42,10 +42,15 @@ impl Server {
             .arg(folder.join("data"))
             .arg("--record")
             .arg(folder.join("run.rec"))
-            .env("RUST_LOG", "error")
             .stdout(Stdio::null())
+            .stderr(std::fs::OpenOptions::new().create(true).append(true).open(folder.join("log")).unwrap())
             .spawn()
             .unwrap()
+    }
+
+    /// Lines that it has logged.
+    pub fn logged(&self) -> usize {
+        std::fs::read_to_string(self.folder.join("log")).unwrap_or_default().lines().count()
     }
 
     /// `user …`: says who may do what.
@@ -57,6 +62,13 @@ impl Server {
             .output()
             .unwrap();
         assert!(done.status.success(), "{arguments:?}: {}", String::from_utf8_lossy(&done.stderr));
+    }
+
+    /// Memory that it uses.
+    pub fn memory_bytes(&self) -> u64 {
+        let status = std::fs::read_to_string(format!("/proc/{}/status", self.child.id())).unwrap_or_default();
+        let line = status.lines().find_map(|line| line.strip_prefix("VmRSS:"));
+        line.and_then(|line| line.split_whitespace().next()?.parse::<u64>().ok()).unwrap_or(0) << 10
     }
 
     /// kill -9.

@@ -5,6 +5,8 @@
 
 mod cut;
 mod drive;
+mod flood;
 mod journals;
 mod kill;
+mod load;
 mod users;

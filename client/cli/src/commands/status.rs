@@ -4,7 +4,7 @@ use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::time::{Duration, Instant};
 use toponym::{Connection, Planner};
-use toponym_proto::answer::{Info, MapWork, RobotState};
+use toponym_proto::answer::Info;
 
 /// Arguments of `status`.
 #[derive(Debug, clap::Args)]
@@ -30,26 +30,7 @@ pub async fn status(to: &Connection, site: &str, args: &StatusArgs) -> Result<u8
     } else {
         print!("{}", told(&info, took));
     }
-    Ok(if troubles(&info).is_empty() { exit::FOUND } else { exit::NOT_KNOWN })
-}
-
-/// What is not as it should be, in words.
-fn troubles(info: &Info) -> Vec<String> {
-    let broken = info.broken.iter().map(|problem| problem.message.clone());
-    let journal = |map: &MapWork| Some(format!("map {}: {}", map.map, map.trouble.as_ref()?));
-    let robot = |robot: &RobotState| {
-        let counts = &robot.counts;
-        let mut why: Vec<String> =
-            [(counts.lost, "lost"), (counts.refused, "refused"), (counts.unused, "of no use")]
-                .into_iter()
-                .filter(|(count, _)| *count > 0)
-                .map(|(count, what)| format!("{count} messages {what}"))
-                .collect();
-        why.extend(robot.error.as_ref().map(|e| e.message.clone()));
-        why.extend(robot.unused.clone());
-        (!why.is_empty()).then(|| format!("robot {}: {}", robot.robot, why.join("; ")))
-    };
-    broken.chain(info.work.iter().filter_map(journal)).chain(info.robots.iter().filter_map(robot)).collect()
+    Ok(if info.troubles().is_empty() { exit::FOUND } else { exit::NOT_KNOWN })
 }
 
 fn told(info: &Info, took: Duration) -> String {
@@ -58,7 +39,14 @@ fn told(info: &Info, took: Duration) -> String {
         let _ = write!(text, "map    {:<16} epoch {}, rev {}", map.id, map.epoch, map.rev);
         if let Some(work) = info.work.iter().find(|work| work.map == map.id) {
             let kb = work.backlog_bytes.div_ceil(1000);
-            let _ = write!(text, "; robot {}, {kb} kB on their way, {} held", work.robot, work.held);
+            let _ = write!(
+                text,
+                "; robot {}, {kb} kB on their way, {} held, filter {:.1} s behind, last sync {:.0} ms",
+                work.robot,
+                work.held,
+                work.lag_s,
+                1e3 * work.sync_s
+            );
         }
         text.push('\n');
     }
@@ -76,10 +64,14 @@ fn told(info: &Info, took: Duration) -> String {
             counts.unused
         );
     }
+    let left = [("disk", info.machine.disk_left_bytes), ("memory", info.machine.memory_left_bytes)];
+    let left =
+        left.iter().filter_map(|(what, bytes)| Some(format!("{what} {:.1} GB", (*bytes)? as f64 / 1e9)));
+    let _ = writeln!(text, "left   {}", left.collect::<Vec<_>>().join(", "));
     if info.overrun > 0 {
         let _ = writeln!(text, "{} messages were dropped because they came too fast", info.overrun);
     }
-    let troubles = troubles(info);
+    let troubles = info.troubles();
     for trouble in &troubles {
         let _ = writeln!(text, "TROUBLE  {trouble}");
     }
@@ -92,7 +84,7 @@ fn told(info: &Info, took: Duration) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toponym_proto::answer::Counts;
+    use toponym_proto::answer::{Counts, Machine, MapWork, RobotState};
 
     #[test]
     fn what_is_wrong_is_told() {
@@ -110,8 +102,10 @@ mod tests {
                 ..MapWork::default()
             }],
             broken: vec![],
+            machine: Machine { disk_left_bytes: Some(2_500_000_000), ..Machine::default() },
         };
-        assert!(told(&info(well.clone(), None), Duration::ZERO).ends_with("all is well\n"));
+        let all = told(&info(well.clone(), None), Duration::ZERO);
+        assert!(all.ends_with("left   disk 2.5 GB\nall is well\n"), "{all}");
         let full = told(&info(well.clone(), Some("no space left")), Duration::ZERO);
         assert!(full.contains("TROUBLE  map main: no space left"), "{full}");
         let ill = RobotState { counts: Counts { lost: 3, ..Counts::default() }, ..well };
