@@ -9,7 +9,7 @@ use crate::geometry::side;
 use crate::language::act::{Act, Content, Head, Parse, Phrase};
 use crate::language::{self, names_in};
 use crate::talk::describe::located;
-use crate::talk::ledger::{Entry, UTTERANCES_MAX};
+use crate::talk::ledger::{Entry, NAMES_MAX, UTTERANCES_MAX};
 use crate::talk::questions::Said;
 use crate::talk::take_in::take_in;
 use crate::talk::{Here, Talk};
@@ -44,7 +44,8 @@ pub(crate) fn take(
         return (heard(u, HeardStatus::Refused, &parse, words), asks);
     }
     if talk.ledger.is_full() {
-        let words = format!("{words} But I can't keep more than {UTTERANCES_MAX} sentences.");
+        let words =
+            format!("{words} But I can't keep more than {UTTERANCES_MAX} sentences or {NAMES_MAX} names.");
         return (heard(u, HeardStatus::Refused, &parse, words), asks);
     }
     let (held, stamp_ns) = (said.held, said.stamp_ns);

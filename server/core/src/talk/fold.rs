@@ -16,7 +16,6 @@ use crate::filter::naming::{
 };
 use crate::filter::particle::Particle;
 use crate::graph::stretches::Stretch;
-use crate::language::Name;
 use crate::language::act::Sameness;
 use crate::talk::Talk;
 use crate::talk::claims::{Claim, Claims, Testimony};
@@ -34,6 +33,9 @@ const INTRODUCED_AGAIN: f64 = 0.5;
 const TALKED_ABOUT_M: f64 = 10.0;
 /// Places so far back along the path are no visit before.
 const VISITED_BACK: Vertex = 12;
+/// Sentences that are weighed anew in each map; what was said before them is taken as said, so that the time for one more
+/// is bounded.
+const WEIGHED_MAX: usize = 1000;
 /// Two successive places are hardly farther apart.
 const SPACING_MAX_M: f64 = 2.0;
 
@@ -44,7 +46,11 @@ pub fn log_likelihood(talk: &Talk, vague: &[&Stretch], particle: &Particle) -> f
         return 0.0;
     }
     let mut fold = Fold::new(talk, Floors::of(vague, particle), particle, &standing);
-    let log_ratios = standing.iter().map(|(t, units)| {
+    let (old, new) = standing.split_at(standing.len().saturating_sub(WEIGHED_MAX));
+    for (t, units) in old {
+        fold.hear(t, units);
+    }
+    let log_ratios = new.iter().map(|(t, units)| {
         let ratio = fold.ratio(t, units) * fold.introduced(t);
         fold.hear(t, units);
         ratio.ln()
@@ -67,11 +73,6 @@ impl Talk {
         self.testimonies.iter().filter(|t| stands(t.utterance)).map(|t| (t, self.units(t))).collect()
     }
 
-    /// Whether a name is that of a way, such as every building has.
-    fn is_way(&self, label: LabelId) -> bool {
-        Name::new(self.ledger.name(label)).is_some_and(|name| name.is_way())
-    }
-
     /// What a name as said in an utterance means, unless it was forgotten since.
     fn meant(&self, utterance: u32, said: LabelId) -> Option<LabelId> {
         let label = self.ledger.meant(said);
@@ -82,7 +83,8 @@ impl Talk {
     fn names(&self, testimony: &Testimony) -> impl Iterator<Item = LabelId> {
         let claims = testimony.readings.iter().flat_map(|r| &r.claims);
         let said = claims.filter_map(|(_, claim)| claim.name());
-        said.filter_map(|said| self.meant(testimony.utterance, said)).filter(|&label| !self.is_way(label))
+        said.filter_map(|said| self.meant(testimony.utterance, said))
+            .filter(|&label| !self.ledger.is_way(label))
     }
 
     fn units(&self, testimony: &Testimony) -> Vec<Units> {
@@ -174,7 +176,8 @@ impl<'a> Fold<'a> {
         standing: &[(&Testimony, Vec<Units>)],
     ) -> Self {
         let names = talk.ledger.names().len();
-        let mut base = BaseMeasure::new((0..names as LabelId).map(|label| talk.is_way(label)).collect());
+        let mut base =
+            BaseMeasure::new((0..names as LabelId).map(|label| talk.ledger.is_way(label)).collect());
         let (mut numbers, mut sites) = (BTreeMap::new(), Vec::new());
         for units in standing.iter().flat_map(|(_, units)| units) {
             base.count(units.label, units.tally.said);

@@ -10,7 +10,9 @@ use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Sentences taken in; beyond, none is.
-pub const UTTERANCES_MAX: usize = 100_000;
+pub const UTTERANCES_MAX: usize = 20_000;
+/// Names taken in, about; beyond, no sentence is.
+pub const NAMES_MAX: usize = 2_000;
 /// Descriptions that are grounded again as the map grows; the oldest stay where they are.
 const DESCRIPTIONS_MAX: usize = 256;
 
@@ -35,6 +37,9 @@ pub struct Entry {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Ledger {
     names: Vec<String>,
+    /// Of the first names, whether they are those of ways: known again once the next is entered.
+    #[serde(skip)]
+    ways: Vec<bool>,
     by_name: BTreeMap<String, LabelId>,
     /// Names that mean another one, with the utterance that says so; none: the operator does.
     aliases: BTreeMap<LabelId, (LabelId, Option<u32>)>,
@@ -75,6 +80,12 @@ impl Ledger {
         self.spelled.get(name).map_or(name, String::as_str)
     }
 
+    /// Whether a name is that of a way, such as every building has.
+    pub fn is_way(&self, label: LabelId) -> bool {
+        let name_is_way = || Name::new(self.name(label)).is_some_and(|name| name.is_way());
+        self.ways.get(label as usize).copied().unwrap_or_else(name_is_way)
+    }
+
     /// All names in the order first said.
     pub fn names(&self) -> &[String] {
         &self.names
@@ -92,7 +103,7 @@ impl Ledger {
 
     /// Whether no more fits in.
     pub fn is_full(&self) -> bool {
-        self.entries.len() >= UTTERANCES_MAX
+        self.entries.len() >= UTTERANCES_MAX || self.names.len() >= NAMES_MAX
     }
 
     /// The number of an utterance that stands; of the newest one without an id.
@@ -133,6 +144,9 @@ impl Ledger {
         let id = self.names.len() as LabelId;
         self.names.push(name.as_str().to_owned());
         self.by_name.insert(name.as_str().to_owned(), id);
+        let ways = (self.ways.len()..self.names.len()).map(|label| self.is_way(label as LabelId));
+        let ways: Vec<bool> = ways.collect();
+        self.ways.extend(ways);
         id
     }
 
