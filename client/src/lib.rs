@@ -26,6 +26,7 @@ pub mod planner;
 pub mod replay;
 pub mod robot;
 pub mod session;
+pub mod spool;
 
 #[cfg(test)]
 mod network_tests;

@@ -4,7 +4,9 @@
 //! `out/ack`; whatever is above it is kept here and sent again when the watermark stands still.
 
 use crate::session::{ClientError, ask};
+use crate::spool::Spool;
 use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::watch;
 use tokio::time::{Instant, timeout_at};
@@ -60,6 +62,11 @@ pub struct RobotConfig {
     pub resend_after: Duration,
     /// How long the watermark may stand still before sending fails.
     pub patience: Duration,
+    /// Folder for what the server does not have yet. With it sending does not wait while there is room on disk, and what
+    /// is left when the program ends is sent at its next start.
+    pub spool: Option<PathBuf>,
+    /// Bytes on disk.
+    pub spool_max_bytes: u64,
 }
 
 impl RobotConfig {
@@ -75,6 +82,8 @@ impl RobotConfig {
             in_flight_max: 1000,
             resend_after: Duration::from_secs(2),
             patience: Duration::from_secs(3600),
+            spool: None,
+            spool_max_bytes: 1 << 30,
         }
     }
 }
@@ -95,6 +104,7 @@ pub struct Robot {
     next: u64,
     publishers: BTreeMap<String, AdvancedPublisher<'static>>,
     unacked: VecDeque<Unacked>,
+    spool: Option<Spool>,
     /// When the watermark last moved, or the first message after it was sent.
     moved: Instant,
     /// When all above it was last sent again.
@@ -106,30 +116,47 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// Gets ready to send; the first message should be a [`Setup`].
+    /// Gets ready to send; the first message should be a [`Setup`]. What an earlier start left in the spool is sent before.
     ///
     /// # Errors
-    /// If site or robot are no ids; Zenoh's own.
+    /// If site or robot are no ids; if what was left can't be read, or sent; Zenoh's own.
     pub async fn connect(session: &Session, config: RobotConfig) -> Result<Self, ClientError> {
         check_id("robot", &config.robot)?;
         let keys = Keys::new(&config.site)?;
         let (acks, on_ack) = latest(session, keys.ack(&config.robot)).await?;
         let (states, on_state) = latest(session, keys.state(&config.robot)).await?;
         let resend_after = config.resend_after;
-        Ok(Self {
+        let open = |folder: &PathBuf| Spool::open(folder, &config.robot, config.spool_max_bytes);
+        let spool = config.spool.as_ref().map(open).transpose().map_err(ClientError::Spool)?;
+        let mut robot = Self {
             session: session.clone(),
             config,
             keys,
             next: 0,
             publishers: BTreeMap::new(),
             unacked: VecDeque::new(),
+            spool,
             moved: Instant::now(),
             resent: Instant::now(),
             resend_after,
             acks,
             states,
             _subscribers: [on_ack, on_state],
-        })
+        };
+        robot.send_what_was_left().await?;
+        Ok(robot)
+    }
+
+    /// Sends what earlier starts left in the spool, each with its own boot.
+    async fn send_what_was_left(&mut self) -> Result<(), ClientError> {
+        let own = self.config.boot;
+        while let Some(boot) = self.spool.as_ref().and_then(Spool::boot) {
+            self.config.boot = boot;
+            let settled = self.settle().await;
+            self.config.boot = own;
+            settled?;
+        }
+        Ok(())
     }
 
     /// Presents the robot: its header needs no more than a stamp.
@@ -167,17 +194,15 @@ impl Robot {
         };
         *header = Header { robot, boot, seq, clock, stamp: header.stamp };
         message.validate(&Limits::default())?;
-        let (key, bytes) = self.encoded(&message)?;
         self.drop_acked();
-        while self.unacked.len() >= self.config.in_flight_max {
-            self.progress().await?;
+        if !self.keep(seq, &message)? {
+            while self.unacked.len() >= self.config.in_flight_max {
+                self.progress().await?;
+            }
+            self.launch(seq, &message).await?;
         }
-        if self.unacked.is_empty() {
-            self.moved = Instant::now();
-        }
-        self.unacked.push_back(Unacked { seq, key: key.clone(), bytes: bytes.clone() });
         self.next += 1;
-        self.put(&key, bytes).await?;
+        self.refill().await?;
         if Instant::now() >= self.resend_at() {
             // Somewhere behind, something is missing: the server waits for it, but not for long.
             self.resend().await?;
@@ -186,14 +211,52 @@ impl Robot {
         Ok(seq)
     }
 
+    /// Puts a message into the spool; true if it waits there for its turn.
+    fn keep(&mut self, seq: u64, message: &Message) -> Result<bool, ClientError> {
+        let Some(spool) = &mut self.spool else { return Ok(false) };
+        let waits = spool.waits() || self.unacked.len() >= self.config.in_flight_max;
+        if spool.is_full() && !spool.waits() {
+            return Ok(false);
+        }
+        let bincode = message
+            .to_bincode()
+            .map_err(|e| ClientError::Unreadable { key: "spool".into(), why: e.to_string() })?;
+        spool.keep((self.config.boot, seq), &bincode, waits).map_err(ClientError::Spool)?;
+        Ok(waits)
+    }
+
+    /// Sends a message whose turn it is.
+    async fn launch(&mut self, seq: u64, message: &Message) -> Result<(), ClientError> {
+        let (key, bytes) = self.encoded(message)?;
+        if self.unacked.is_empty() {
+            self.moved = Instant::now();
+        }
+        self.unacked.push_back(Unacked { seq, key: key.clone(), bytes: bytes.clone() });
+        self.put(&key, bytes).await
+    }
+
+    /// Sends what waits in the spool, as far as there is room in flight.
+    async fn refill(&mut self) -> Result<(), ClientError> {
+        while self.unacked.len() < self.config.in_flight_max
+            && let Some(spool) = &mut self.spool
+            && let Some(message) = spool.next(self.config.boot).map_err(ClientError::Spool)?
+        {
+            let seq = message.header().map_or(0, |header| header.seq);
+            self.launch(seq, &message).await?;
+        }
+        Ok(())
+    }
+
     /// Waits until everything sent is acknowledged.
     ///
     /// # Errors
     /// As [`Robot::send`].
     pub async fn settle(&mut self) -> Result<(), ClientError> {
         self.drop_acked();
+        self.refill().await?;
         while !self.unacked.is_empty() {
             self.progress().await?;
+            self.refill().await?;
         }
         self.check_refused()
     }
@@ -272,6 +335,11 @@ impl Robot {
             self.unacked.pop_front();
             (self.moved, self.resend_after) = (Instant::now(), self.config.resend_after);
         }
+        if let Some(spool) = &mut self.spool
+            && let Err(e) = spool.acknowledged((self.config.boot, seq))
+        {
+            warn!("what is acknowledged stays in the spool: {e}");
+        }
     }
 
     fn check_refused(&self) -> Result<(), ClientError> {
@@ -317,6 +385,11 @@ impl Robot {
             ask(&self.session, &self.keys.ack(&self.config.robot), "", ASK_WAIT).await;
         match asked {
             Ok(ack) if ack.boot == self.config.boot => self.drop_until(ack.seq),
+            Ok(ack) if ack.boot > self.config.boot => {
+                // A later start is known there: nothing of this one is taken any more.
+                warn!(boot = self.config.boot, later = ack.boot, "all that is left of this start is dropped");
+                self.drop_until(u64::MAX);
+            }
             Ok(_) => {}
             Err(e) => warn!("the watermark is not known: {e}"),
         }

@@ -53,6 +53,9 @@ pub enum ClientError {
         /// What is wrong with it.
         why: String,
     },
+    /// What is kept on disk can't be written or read.
+    #[error("spool: {0}")]
+    Spool(#[source] std::io::Error),
     /// Zenoh's own.
     #[error("zenoh: {0}")]
     Zenoh(#[source] zenoh::Error),

@@ -9,4 +9,5 @@ mod flood;
 mod journals;
 mod kill;
 mod load;
+mod spool;
 mod users;

@@ -149,7 +149,7 @@ impl Failure {
             Self::Client(ClientError::Refused(_) | ClientError::Unreadable { .. }) | Self::Lost(_) => {
                 exit::REFUSED
             }
-            Self::Client(ClientError::Invalid(_))
+            Self::Client(ClientError::Invalid(_) | ClientError::Spool(_))
             | Self::Log(_)
             | Self::Narration(_)
             | Self::Simulate(_)

@@ -41,6 +41,10 @@ pub struct ReplayArgs {
     /// Longest time without any acknowledgement: a cut that is shorter is waited out.
     #[arg(long, value_name = "S", default_value = "3600", value_parser = super::seconds)]
     timeout: Duration,
+    /// Keep on disk what the server does not have yet: sending does not wait during a cut, and what is left is sent by the
+    /// next replay.
+    #[arg(long, value_name = "FOLDER")]
+    spool: Option<PathBuf>,
 }
 
 /// Seconds of the log per second; none: unlimited.
@@ -65,6 +69,7 @@ pub async fn replay(to: &Connection, site: &str, args: &ReplayArgs) -> Result<u8
     robot.clock = Clock::Log;
     robot.boot = args.boot.unwrap_or(robot.boot);
     robot.patience = args.timeout;
+    robot.spool.clone_from(&args.spool);
     let boot = robot.boot;
     let replay = Replay { robot, map: Some(args.map.clone()), speed: args.speed.0 };
     let (bar, begin) = (bar(), Instant::now());
