@@ -3,6 +3,8 @@
 //! `TOPONYM_CUT_S` sets how long it is away (2).
 
 use crate::drive::{Drive, Server, setting};
+use rand::{RngExt as _, SeedableRng as _};
+use rand_chacha::ChaCha8Rng;
 use std::net::SocketAddr;
 use std::time::Duration;
 use tokio::io::{AsyncReadExt as _, AsyncWriteExt as _};
@@ -16,10 +18,21 @@ pub enum Line {
     Open,
     /// What the server sends waits: its client does not listen.
     Deaf,
+    /// So many of a hundred segments are lost, and sent again by TCP after a while.
+    Lossy(u32),
     /// It waits: neither side is told.
     Stalled,
     /// Connections end, and new ones are refused.
     Cut,
+}
+
+/// TCP's shortest wait before it sends a segment again.
+const RETRANSMITTED: Duration = Duration::from_millis(200);
+
+impl Line {
+    fn segment_bytes(self) -> usize {
+        if matches!(self, Self::Lossy(_)) { 1448 } else { 1 << 14 }
+    }
 }
 
 /// A line between robot and server.
@@ -57,6 +70,7 @@ async fn carry(
     is_to_client: bool,
 ) {
     let mut bytes = vec![0; 1 << 14];
+    let mut random = ChaCha8Rng::seed_from_u64(u64::from(is_to_client));
     loop {
         let state = *line.borrow_and_update();
         let read = match state {
@@ -67,11 +81,19 @@ async fn carry(
                 }
                 continue;
             }
-            Line::Open | Line::Deaf | Line::Stalled => tokio::select! {
-                read = from.read(&mut bytes) => read,
+            Line::Open | Line::Deaf | Line::Stalled | Line::Lossy(_) => tokio::select! {
+                read = from.read(&mut bytes[..state.segment_bytes()]) => read,
                 changed = line.changed() => if changed.is_ok() { continue } else { return },
             },
         };
+        if let Line::Lossy(percent) = state {
+            // Waits twice as long each time the same segment is lost again.
+            let mut wait = RETRANSMITTED;
+            while random.random_range(0..100) < percent {
+                tokio::time::sleep(wait).await;
+                wait *= 2;
+            }
+        }
         match read {
             Ok(count @ 1..) if to.write_all(&bytes[..count]).await.is_ok() => {}
             _ => return,
@@ -127,4 +149,9 @@ async fn a_stall_loses_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_half_open_connection_loses_nothing() {
     nothing_is_lost(&[(Line::Stalled, Duration::from_secs(12))]).await;
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_lossy_line_loses_nothing() {
+    nothing_is_lost(&[(Line::Lossy(1), away()), (Line::Lossy(10), away()), (Line::Lossy(30), away())]).await;
 }

@@ -9,5 +9,6 @@ mod flood;
 mod journals;
 mod kill;
 mod load;
+mod soak;
 mod spool;
 mod users;
