@@ -36,9 +36,10 @@ fn entries(log: &Path, messages: usize) -> Vec<Entry> {
         let at_ns = entries.last().map_or(0, |entry| entry.at_ns) + 20_000_000;
         let began = message.header().map(|header| header.stamp);
         entries.push(Entry { at_ns, event: Event::Message(message) });
-        if entries.len() % 400 == 0 {
+        if entries.len().is_multiple_of(400) {
             let n = entries.len() / 400;
-            let text = if n % 2 == 0 { format!("this is room {n}") } else { "this is the kitchen".into() };
+            let text =
+                if n.is_multiple_of(2) { format!("this is room {n}") } else { "this is the kitchen".into() };
             let say = Say { id: format!("s{n}"), text, began, robot: Some("r1".into()), ..Say::default() };
             entries.push(Entry { at_ns, event: Event::Say { boot: 1, say } });
         }

@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, SystemTime};
 use toponym_proto::keys::check_id;
 
-use super::policy::write_secret;
+use super::policy::{make_folder, write_secret};
 
 /// How long the authority is valid.
 const CA_DAYS: u64 = 3650;
@@ -66,7 +66,7 @@ struct NewCert {
 /// Carries a command out.
 pub fn make_certificate(args: &CertArgs) -> anyhow::Result<()> {
     let CertCommand::New(new) = &args.command;
-    fs::create_dir_all(&new.folder).with_context(|| new.folder.display().to_string())?;
+    make_folder(&new.folder).with_context(|| new.folder.display().to_string())?;
     let issuer = authority(&new.folder)?;
     let (file, names, usage) = match &new.client {
         Some(user) => {

@@ -176,11 +176,29 @@ pub fn write_secret(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
     let mut file = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&new)?;
     file.write_all(bytes)?;
     file.sync_all()?;
-    let folder = new.parent().filter(|f| !f.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    give_to_owner_of(parent(&new), &new)?;
+    fs::rename(&new, path)
+}
+
+/// Makes a folder, if there is none, of the owner of the one that it is in.
+pub fn make_folder(path: &Path) -> std::io::Result<()> {
+    if path.is_dir() {
+        return Ok(());
+    }
+    make_folder(parent(path))?;
+    fs::create_dir(path)?;
+    give_to_owner_of(parent(path), path)
+}
+
+fn parent(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+fn give_to_owner_of(folder: &Path, path: &Path) -> std::io::Result<()> {
     let owner = fs::metadata(folder)?;
     // Only root may; for everybody else it is theirs already.
-    let _ = chown(&new, Some(owner.uid()), Some(owner.gid()));
-    fs::rename(&new, path)
+    let _ = chown(path, Some(owner.uid()), Some(owner.gid()));
+    Ok(())
 }
 
 #[cfg(test)]

@@ -7,7 +7,7 @@ use std::path::PathBuf;
 use toponym_proto::keys::check_id;
 use ulid::Ulid;
 
-use super::policy::{Policy, Role, User};
+use super::policy::{Policy, Role, User, make_folder};
 use crate::config::ServerConfig;
 
 /// Say who may do what.
@@ -93,7 +93,7 @@ pub fn edit_users(args: &UserArgs) -> anyhow::Result<()> {
             let user = User { role: *role, robots: robot.clone(), password: password.clone() };
             policy.users.insert(name.clone(), user);
             if let Some(folder) = path.parent() {
-                fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+                make_folder(folder).with_context(|| folder.display().to_string())?;
             }
             policy.write(&path)?;
             println!("{name} is a {} now ({})", word(*role), path.display());
