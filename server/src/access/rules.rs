@@ -144,6 +144,7 @@ pub fn rules(keys: &Keys, policy: &Policy) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::fmt::Write as _;
 
     fn user(role: Role, robots: &[&str]) -> User {
         let robots = robots.iter().map(ToString::to_string).collect();
@@ -171,7 +172,7 @@ mod tests {
             (Role::Operator, &[]),
             (Role::Trusted, &[]),
         ] {
-            all += &format!("# {role:?} of {robots:?}\n{}\n", told("r08", &user(role, robots)));
+            let _ = writeln!(all, "# {role:?} of {robots:?}\n{}", told("r08", &user(role, robots)));
         }
         assert_eq!(all, include_str!("granted.txt"), "granted.txt is not what is granted now:\n{all}");
     }

@@ -104,7 +104,7 @@ mod tests {
         let began = Instant::now();
         let mut kind = Measure::new(began);
         let written = (0..1000).filter(|_| kind.take(began).is_some()).count();
-        assert_eq!(written as f64, BURST);
+        assert_eq!(written, BURST as usize);
         assert_eq!(kind.take(began + Duration::from_secs(1)), Some(1000 - written as u64));
         assert_eq!(kind.take(began + Duration::from_secs(1)), Some(0));
         assert_eq!(kind.take(began + Duration::from_secs(1)), None);

@@ -7,6 +7,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod scene;
 // The journal's own tests stop it at operations of their choice.
 #[allow(dead_code)]
 #[path = "../../journal/tests/medium/sim.rs"]

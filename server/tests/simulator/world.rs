@@ -1,18 +1,17 @@
 //! The world of one seed.
 
+use crate::scene::{message, newborn, patience, say};
 use crate::sim::{CRASHES, Crash, Fault, SimDisk};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use std::collections::{BTreeMap, HashMap};
 use std::time::Duration;
-use toponym_core::Mapper;
 use toponym_journal::{Entry, Event, Journal, prune};
+use toponym_proto::Message;
 use toponym_proto::answer::HeardStatus;
-use toponym_proto::sequence::{Patience, Sequencer, Step};
-use toponym_proto::{Clock, Header, Message, Say, Stamp};
-use toponym_server::fold::{Card, Fold, Outcome};
+use toponym_proto::sequence::{Sequencer, Step};
+use toponym_server::fold::{Fold, Outcome};
 use toponym_server::store::{checkpoint, identity};
-use toponym_sim::hall::{self, PERIOD_NS};
 
 /// A bug, to see that it is noticed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,7 +58,7 @@ const MESSAGES: u64 = 120;
 const SENTENCES: u64 = 4;
 
 /// What is on its way over the network, either way.
-#[derive(Clone)]
+#[derive(Clone, Copy)]
 enum Packet {
     Message(u64),
     Say(u64),
@@ -96,40 +95,6 @@ struct World {
     heard: Vec<bool>,
     fault_ends: Duration,
     told: Told,
-}
-
-fn message(n: u64) -> Message {
-    let mut message = hall::message(n, "main", 61);
-    let header = Header { robot: "r1".into(), boot: 1, seq: n, clock: Clock::Log, ..Header::default() };
-    match &mut message {
-        Message::Setup(m) => m.header = Header { stamp: m.header.stamp, ..header },
-        Message::Odom(m) => m.header = Header { stamp: m.header.stamp, ..header },
-        Message::Scan(m) => m.header = Header { stamp: m.header.stamp, ..header },
-        _ => unreachable!("the hall has no others"),
-    }
-    message
-}
-
-fn say(n: u64) -> Say {
-    let text = ["this is the kitchen", "this is the gym", "the lab is down the hall", "this is the lounge"];
-    let began = Some(Stamp { ns: (n as i64 + 1) * 25 * PERIOD_NS });
-    Say {
-        id: format!("s{n}"),
-        text: text[n as usize % 4].into(),
-        began,
-        robot: Some("r1".into()),
-        ..Say::default()
-    }
-}
-
-fn patience() -> Patience {
-    Patience { join_wait: Duration::from_secs(15), gap_wait: Duration::from_secs(30), window: 1024 }
-}
-
-fn newborn() -> Fold {
-    let config = toponym_core::Config { particles: 2, ..Default::default() };
-    let card = Card { uuid: "u".into(), robot: "r1".into(), ..Card::default() };
-    Fold::new(Mapper::new(config), card, Duration::from_millis(200))
 }
 
 /// Runs a seed until all is settled, and looks whether it is as it should be.
@@ -297,7 +262,7 @@ impl World {
             let late = if self.random.random_bool(0.1) { 400 } else { 30 };
             let at = self.now + Duration::from_millis(self.random.random_range(0..late));
             self.packets += 1;
-            self.network.insert((at, self.packets), packet.clone());
+            self.network.insert((at, self.packets), packet);
         }
     }
 
@@ -312,7 +277,7 @@ impl World {
 
     fn append(&mut self, event: Event) {
         let server = &mut self.server;
-        let at_ns = (server.base + (self.now - server.began)).as_nanos() as u64;
+        let at_ns = (server.base + self.now.saturating_sub(server.began)).as_nanos() as u64;
         let entry = Entry { at_ns, event };
         let number = server.journal.append(&entry.to_bytes().unwrap());
         server.unsynced.push((number, entry));

@@ -3,17 +3,21 @@
 //! A publication that went well proves nothing. What counts is the server's watermark on
 //! `out/ack`; whatever is above it is kept here and sent again when the watermark stands still.
 
+mod config;
+
+pub use config::{Form, RobotConfig};
+
 use crate::session::{ClientError, ask};
 use crate::spool::Spool;
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 use tokio::sync::watch;
 use tokio::time::{Instant, timeout_at};
 use toponym_proto::answer::{Ack, Problem, RobotState};
 use toponym_proto::codec::{ENCODING_BINCODE, ENCODING_JSON};
-use toponym_proto::keys::{DEFAULT_SITE, check_id};
-use toponym_proto::{Clock, End, Header, Invalid, Keys, Limits, Message, Odom, Pose, Scan, Setup, Stamp};
+use toponym_proto::keys::check_id;
+use toponym_proto::{End, Header, Invalid, Keys, Limits, Message, Odom, Pose, Scan, Setup, Stamp};
 use tracing::warn;
 use zenoh::Session;
 use zenoh::bytes::ZBytes;
@@ -28,65 +32,6 @@ const HEARTBEAT: Duration = Duration::from_millis(500);
 const RESEND_MAX: Duration = Duration::from_secs(8);
 /// How long the server may take to tell its watermark when asked.
 const ASK_WAIT: Duration = Duration::from_secs(1);
-
-/// Form of the payloads.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Form {
-    /// Short and quick.
-    #[default]
-    Bincode,
-    /// Readable.
-    Json,
-}
-
-/// Settings of a [`Robot`].
-#[derive(Clone, Debug)]
-pub struct RobotConfig {
-    /// Site.
-    pub site: String,
-    /// Robot id.
-    pub robot: String,
-    /// Grows with each start; the Unix time of now in seconds.
-    pub boot: u64,
-    /// Which clock the stamps are of.
-    pub clock: Clock,
-    /// Form of the payloads.
-    pub form: Form,
-    /// Messages kept until they are acknowledged; sending waits while there are so many. No more
-    /// than the server's `gap_window` (1024 by default): then a message that got lost can never be
-    /// given up because too many came after it, only after `gap_wait_s`, and it is sent again
-    /// sooner.
-    pub in_flight_max: usize,
-    /// A watermark that stands still so long means that something got lost: what is above it is
-    /// sent again, the next time after twice as long.
-    pub resend_after: Duration,
-    /// How long the watermark may stand still before sending fails.
-    pub patience: Duration,
-    /// Folder for what the server does not have yet. With it sending does not wait while there is room on disk, and what
-    /// is left when the program ends is sent at its next start.
-    pub spool: Option<PathBuf>,
-    /// Bytes on disk.
-    pub spool_max_bytes: u64,
-}
-
-impl RobotConfig {
-    /// The defaults for a robot.
-    pub fn new(robot: &str) -> Self {
-        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
-        Self {
-            site: DEFAULT_SITE.into(),
-            robot: robot.into(),
-            boot: since_1970.as_secs(),
-            clock: Clock::Unix,
-            form: Form::Bincode,
-            in_flight_max: 1000,
-            resend_after: Duration::from_secs(2),
-            patience: Duration::from_secs(3600),
-            spool: None,
-            spool_max_bytes: 1 << 30,
-        }
-    }
-}
 
 /// A message that isn't acknowledged yet.
 struct Unacked {
