@@ -94,6 +94,10 @@ fn grants(keys: &Keys, name: &str, user: &User) -> Grants {
     if is(&[Role::Operator]) {
         grants.ask(&keys.command("*"), &everything);
     }
+    if is(&[]) {
+        // What is asked on a wrong key is told so, too.
+        grants.ask(&everything, &everything);
+    }
     grants
 }
 
