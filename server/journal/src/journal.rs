@@ -226,6 +226,13 @@ fn whole_entries(
         return Err(JournalError::damaged(&segment.name, offset, why));
     }
     if segment.slots_lost > 0 {
+        // A stop while a mark is written leaves the entries that it was to tell of, whole and with nothing behind them. If
+        // it is otherwise, the mark was lost later, and may have told of more than is left.
+        if next.is_none() && (segment.broken.is_some() || there == segment.durable + 1) {
+            let why =
+                "one of two marks of what is durable is damaged: more may have been durable than is left";
+            return Err(JournalError::damaged(&segment.name, segment::SLOTS_AT[0], why));
+        }
         mended.push(format!("{}: one of two marks of what is durable is lost", segment.name));
     }
     if let (Some((offset, why)), None) = (&segment.broken, next) {

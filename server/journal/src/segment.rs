@@ -8,7 +8,8 @@
 //! 4096  a frame per entry, then zeros
 //! ```
 //! A commit syncs its entries, then writes the slot that is not the newest, and syncs that: what a
-//! slot says is durable, is; and if one is torn or lost, the other one still holds.
+//! slot says is durable, is; and if one is torn or lost, the other one still holds, as long as the entries bear out that
+//! the lost one told of no more than is there.
 
 use crate::{Disk, DiskFile, Identity, JournalError};
 use std::ops::Range;
@@ -19,7 +20,7 @@ const MAGIC: &[u8] = b"toponym-journal 1\n";
 /// Where the identity stands.
 const HEAD_AT: usize = 64;
 /// Where the slots stand, each in a sector of its own.
-const SLOTS_AT: [usize; 2] = [3072, 3584];
+pub const SLOTS_AT: [usize; 2] = [3072, 3584];
 /// Where entries begin.
 pub const FRAMES_AT: usize = 4096;
 /// Name while it is being made.

@@ -204,6 +204,45 @@ fn no_flipped_bit_changes_what_is_recovered() {
     assert!(refused > 500 && mended > 10 && harmless > 500, "{refused} {mended} {harmless}");
 }
 
+/// `TOPONYM_DAMAGES` sets how often (3000), `TOPONYM_SEED` which.
+#[test]
+fn no_damage_changes_what_is_recovered() {
+    let setting =
+        |name: &str, default| std::env::var(name).ok().map_or(default, |text| text.parse().unwrap());
+    let (damages, seed): (u64, u64) = (setting("TOPONYM_DAMAGES", 3000), setting("TOPONYM_SEED", 1));
+    let files = whole(40);
+    let names: Vec<&String> = files.keys().collect();
+    let (mut random, mut refused, mut whole) = (ChaCha8Rng::seed_from_u64(seed), 0, 0);
+    for damage in 0..damages {
+        let mut damaged = files.clone();
+        for _ in 0..random.random_range(1..4) {
+            let name = names[random.random_range(0..names.len())];
+            let content = damaged.get_mut(name).unwrap();
+            let at = random.random_range(0..content.len());
+            let end = (at + random.random_range(1..600)).min(content.len());
+            match random.random_range(0..4) {
+                0 => content[at] ^= 1 << random.random_range(0..8),
+                1 => content[at..end].fill(0),
+                2 => content[at..end].iter_mut().for_each(|byte| *byte = random.random()),
+                // Something of the file in another place of it.
+                _ => {
+                    let to = random.random_range(0..=content.len() - (end - at));
+                    content.copy_within(at..end, to);
+                }
+            }
+        }
+        match recovered(&SimDisk::with(damaged)) {
+            Ok((all, _)) => {
+                assert_eq!(all.len(), 40, "damage {damage} of seed {seed}");
+                whole += 1;
+            }
+            Err(_) => refused += 1,
+        }
+    }
+    println!("{damages} damages: {refused} refused, {whole} mended or harmless");
+    assert!(refused > 0 && whole > 0);
+}
+
 #[test]
 fn no_block_of_zeros_changes_what_is_recovered() {
     let files = whole(100);
