@@ -202,7 +202,7 @@ pub(crate) async fn ask<T: DeserializeOwned>(
     let late = || ClientError::Timeout { what: key.into(), after: timeout };
     let nobody = || ClientError::NoServer {
         endpoint: key.into(),
-        why: "connected, but nobody answers there; is --site right?".into(),
+        why: "connected, but nobody answers there; is --site right, and may this user ask it?".into(),
     };
     let (start, mut silent) = (Instant::now(), false);
     let deadline = start + timeout;
