@@ -1,8 +1,9 @@
 //! Bytes to messages and back: JSON, or bincode behind a version and a type byte.
 
 use crate::keys::Input;
+use crate::limits::{BOOT_MAX, Limits, SEQ_MAX};
 use crate::stream::{End, Message, Odom, Say, Scan, Setup};
-use crate::validate::{BOOT_MAX, Invalid, Limits, SEQ_MAX};
+use crate::validate::Invalid;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 

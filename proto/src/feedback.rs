@@ -3,6 +3,7 @@
 use crate::answer::{MapIdentity, Problem};
 use crate::stream::{Pose, Stamp};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// On `out/heard`: what became of a sentence.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -198,6 +199,9 @@ pub struct Info {
     /// How the machine does.
     #[serde(default)]
     pub machine: Machine,
+    /// How often each limit was reached, by its name in `[limits]`; those that never were are left out.
+    #[serde(default)]
+    pub reached: BTreeMap<String, u64>,
 }
 
 impl Info {

@@ -7,6 +7,7 @@
 //! - [`stream`]: what robots and guides send; [`codec`] turns it into bytes and back,
 //!   [`validate`] refuses what is wrong with it.
 //! - [`answer`] and [`feedback`]: what the server says; [`selector`]: the arguments of a question.
+//! - [`limits`]: all of them.
 //! - [`keys`]: where all of it is on the network.
 //! - [`sequence`] and [`merge`]: into which order a robot's streams and a guide's sentences are
 //!   brought, on the network and offline alike; [`record`]: that order in a file.
@@ -16,6 +17,7 @@ pub mod codec;
 pub mod feedback;
 pub mod frame;
 pub mod keys;
+pub mod limits;
 pub mod merge;
 pub mod record;
 pub mod selector;
@@ -26,5 +28,6 @@ mod wire;
 
 pub use codec::Refused;
 pub use keys::Keys;
+pub use limits::Limits;
 pub use stream::{Clock, End, Header, Hearing, Laser, Mend, Message, Odom, Pose, Say, Scan, Setup, Stamp};
-pub use validate::{Invalid, Limits};
+pub use validate::Invalid;

@@ -10,8 +10,8 @@
 //! arrives over another connection still finds its place.
 
 use crate::codec::Refused;
+use crate::limits::Limits;
 use crate::stream::{Message, Say, Stamp};
-use crate::validate::Limits;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;

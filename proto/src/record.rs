@@ -9,8 +9,8 @@
 
 use crate::codec::Refused;
 use crate::frame::{self, HEAD};
+use crate::limits::Limits;
 use crate::stream::Message;
-use crate::validate::Limits;
 use serde::{Deserialize, Serialize};
 use std::io::{self, BufReader, BufWriter, Read, Write};
 

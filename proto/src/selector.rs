@@ -1,13 +1,11 @@
 //! Arguments of a query: `name=lecture%20hall;robot=r07`, or the same as a JSON object.
 
+use crate::limits::ARGUMENTS_MAX_BYTES;
 use crate::validate::Invalid;
 use std::collections::BTreeMap;
 
 /// Arguments by name.
 pub type Arguments = BTreeMap<String, String>;
-
-/// Longest argument string.
-const ARGUMENTS_MAX_BYTES: usize = 8192;
 
 /// Writes arguments, percent-encoded, for the part of a selector after `?`.
 pub fn encode<'a>(arguments: impl IntoIterator<Item = (&'a str, &'a str)>) -> String {

@@ -1,5 +1,6 @@
 //! One robot's streams put into one order, by (boot, seq).
 
+use crate::limits::AHEAD_MAX;
 use crate::stream::{Header, Message};
 use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
@@ -35,10 +36,6 @@ impl Step {
         }
     }
 }
-
-/// A robot that is known keeps no more in flight than a few thousand messages: a seq further ahead is a mistake, or forged,
-/// and waiting for all before it would shut the robot out.
-const AHEAD_MAX: u64 = 1 << 20;
 
 /// What was dropped, and why.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

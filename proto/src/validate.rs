@@ -1,7 +1,10 @@
-//! Limits, and the only place that rejects.
+//! The only place that rejects.
 
+use crate::limits::{
+    ANGLE_MAX_RAD, BOOT_MAX, COORDINATE_MAX_M, Limits, RANGE_MAX_M, SEQ_MAX, STAMP_MAX_NS,
+    TIME_INCREMENT_MAX_S,
+};
 use crate::stream::{Header, Laser, Mend, Message, Pose, Say, Scan, Setup, Stamp};
-use serde::{Deserialize, Serialize};
 
 /// Stands for "the one robot there is" in the key of a sentence; no robot may bear it.
 pub const ANY_ROBOT: &str = "any";
@@ -22,66 +25,6 @@ impl Invalid {
         Self { field: field.into(), reason: reason.into() }
     }
 }
-
-/// Upper bounds of what is taken in.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(default, deny_unknown_fields)]
-pub struct Limits {
-    /// Bytes of one message.
-    pub payload_bytes: usize,
-    /// Rays of one sweep.
-    pub beams: usize,
-    /// Lasers of one robot.
-    pub lasers: usize,
-    /// Ignored bearing intervals of one laser.
-    pub ignored_sectors: usize,
-    /// Characters of a sentence.
-    pub text_chars: usize,
-    /// Other hearings of a sentence.
-    pub alternatives: usize,
-}
-
-impl Limits {
-    /// Those of what was validated before, maybe against raised limits: only a damaged length is to be told
-    /// from a large message.
-    pub const NONE: Self = Self {
-        payload_bytes: 64 << 20,
-        beams: usize::MAX,
-        lasers: usize::MAX,
-        ignored_sectors: usize::MAX,
-        text_chars: usize::MAX,
-        alternatives: usize::MAX,
-    };
-}
-
-impl Default for Limits {
-    fn default() -> Self {
-        Self {
-            payload_bytes: 1 << 20,
-            beams: 8192,
-            lasers: 8,
-            ignored_sectors: 64,
-            text_chars: 1000,
-            alternatives: 16,
-        }
-    }
-}
-
-/// Largest boot: any Unix time in milliseconds, and far below 2^53, up to which integers in JSON are exact. One that is
-/// far off would make all later starts of its robot look old.
-pub const BOOT_MAX: u64 = 1 << 46;
-/// Largest seq.
-pub const SEQ_MAX: u64 = 1 << 46;
-/// Times stay within this of the clock's zero, so that the difference of two is never too large.
-const STAMP_MAX_NS: i64 = 4_000_000_000_000_000_000;
-/// Coordinates stay within this of the origin: an odometry frame that is further off is broken.
-const COORDINATE_MAX_M: f64 = 1e6;
-/// Longest range of any laser.
-const RANGE_MAX_M: f64 = 1e4;
-/// Longest time between two rays.
-const TIME_INCREMENT_MAX_S: f64 = 1.0;
-/// Angles may be unwrapped, but not absurd.
-const ANGLE_MAX_RAD: f64 = 1e4;
 
 impl Message {
     /// Checks every field; names the first bad one.

@@ -26,16 +26,8 @@ pub struct ServerConfig {
     pub join_wait_s: f64,
     /// Over how many later messages a missing one is waited for.
     pub gap_window: usize,
-    /// Messages that may wait in memory, per robot and on the way in.
-    pub queue_messages: usize,
-    /// Bytes of them on the way in, of all robots and guides.
-    pub queue_bytes: usize,
     /// Shortest time between two published graphs of a map.
     pub graph_period_s: f64,
-    /// Robots that are kept account of.
-    pub robots_max: usize,
-    /// Maps that are kept.
-    pub maps_max: usize,
     /// Whether what people say goes into the log.
     pub log_speech: bool,
     /// Limits of what is taken in.
@@ -80,11 +72,7 @@ impl Default for ServerConfig {
             gap_wait_s: 10.0,
             join_wait_s: 15.0,
             gap_window: 1024,
-            queue_messages: 20_000,
-            queue_bytes: 64 << 20,
             graph_period_s: 1.0,
-            robots_max: 64,
-            maps_max: 16,
             log_speech: false,
             limits: Limits::default(),
             access: AccessConfig::default(),
@@ -165,14 +153,8 @@ impl ServerConfig {
                 return Err(Invalid::new(field, format!("is {value}, must be from {min} to 60")).into());
             }
         }
-        for (field, value) in [
-            ("gap_window", self.gap_window),
-            ("queue_messages", self.queue_messages),
-            ("queue_bytes", self.queue_bytes),
-            ("robots_max", self.robots_max),
-            ("maps_max", self.maps_max),
-            ("mapper.particles", self.mapper.particles as usize),
-        ] {
+        let own = [("gap_window", self.gap_window), ("mapper.particles", self.mapper.particles as usize)];
+        for (field, value) in self.limits.of_the_server().into_iter().chain(own) {
             if value == 0 {
                 return Err(Invalid::new(field, "is 0, must be at least 1").into());
             }
@@ -215,7 +197,7 @@ mod tests {
             ("listen = []", "listen"),
             ("hold_back_s = nan", "hold_back_s"),
             ("gap_wait_s = -1.0", "gap_wait_s"),
-            ("queue_messages = 0", "queue_messages"),
+            ("[limits]\nqueue_messages = 0", "queue_messages"),
         ] {
             assert!(read(text).unwrap_err().contains(name), "{text}");
         }

@@ -9,14 +9,13 @@ use std::time::Duration;
 use toponym_core::{Effect, Mapper};
 use toponym_journal::{Entry, Event};
 use toponym_proto::answer::{ErrorCode, Heard, HeardStatus, Problem};
+use toponym_proto::limits::KNOWN_SENTENCES_MAX;
 use toponym_proto::merge::{Held, HoldBack};
 use toponym_proto::{Message, Say, Stamp};
 
 use crate::convert;
 
 const FORMAT: bincode::config::Configuration = bincode::config::standard();
-/// Sentences that are known again when they come again. A guide repeats one for hours at most.
-const KNOWN_MAX: usize = 10_000;
 
 /// What is known of a map beside the map.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -162,7 +161,7 @@ impl Fold {
             Some(_) => tell(Outcome::Heard(Box::new(read(&say.id)))),
             None => {
                 tell(Outcome::Heard(Box::new(read(&say.id))));
-                if self.known.len() >= KNOWN_MAX {
+                if self.known.len() >= KNOWN_SENTENCES_MAX {
                     self.known.pop_front();
                 }
                 let (id, text) = (say.id.clone(), say.text.clone());

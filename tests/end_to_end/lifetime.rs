@@ -3,7 +3,7 @@
 use crate::site::{Folder, Site, drive, saved_map, settings, setup};
 use toponym_proto::answer::{ErrorCode, GraphReply, Info};
 use toponym_proto::keys::Ask;
-use toponym_proto::{Header, Message, Setup};
+use toponym_proto::{Header, Limits, Message, Setup};
 use toponym_server::config::ServerConfig;
 use toponym_server::serve::{Server, serve};
 
@@ -166,7 +166,7 @@ async fn serving_ends_when_asked_to() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_deleted_map_makes_room_and_is_kept() {
     let folder = Folder::new();
-    let config = ServerConfig { maps_max: 1, ..settings(&folder) };
+    let config = ServerConfig { limits: Limits { maps: 1, ..Limits::default() }, ..settings(&folder) };
     let site = Site::start(config).await;
     let (acks, states) = (site.acks("r1").await, site.states("*").await);
     for message in drive("r1", "main").iter().take(9) {

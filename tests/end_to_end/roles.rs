@@ -67,7 +67,7 @@ async fn a_restart_of_the_server_loses_nothing() {
 async fn strangers_do_not_crowd_out_a_robot() {
     let folder = Folder::new();
     let mut config = settings(&folder);
-    config.robots_max = 1;
+    config.limits.robots = 1;
     let site = Site::start(config).await;
     let (states, acks) = (site.states("*").await, site.acks("r1").await);
     site.put(&site.keys.odom("stranger"), "", b"hello".to_vec()).await;
@@ -86,7 +86,7 @@ async fn strangers_do_not_crowd_out_a_robot() {
 async fn strangers_with_gaps_do_not_keep_a_robot_out() {
     let folder = Folder::new();
     let mut config = settings(&folder);
-    (config.robots_max, config.join_wait_s) = (4, 60.0);
+    (config.limits.robots, config.join_wait_s) = (4, 60.0);
     let site = Site::start(config).await;
     let acks = site.acks("r1").await;
     // What comes before their first message never comes.

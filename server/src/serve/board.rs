@@ -125,6 +125,8 @@ pub struct Board {
     pub robots: Mutex<BTreeMap<String, RobotState>>,
     /// What was last published on a key, for those who come later.
     pub latest: Mutex<BTreeMap<String, Vec<u8>>>,
+    /// How often each limit was reached.
+    pub reached: Mutex<BTreeMap<&'static str, u64>>,
     /// Messages dropped at the door because the server could not keep up.
     pub overrun: AtomicU64,
     /// Bytes of messages that wait to be looked at.
@@ -149,6 +151,7 @@ impl Board {
             broken: Mutex::default(),
             robots: Mutex::default(),
             latest: Mutex::default(),
+            reached: Mutex::default(),
             overrun: AtomicU64::new(0),
             queued_bytes: AtomicUsize::new(0),
             data: data.into(),
@@ -156,6 +159,11 @@ impl Board {
             began: Instant::now(),
             control: OnceLock::new(),
         }
+    }
+
+    /// Counts that a limit was reached.
+    pub fn reach(&self, limit: &'static str) {
+        *lock(&self.reached).entry(limit).or_default() += 1;
     }
 
     /// Shows a map no more.

@@ -51,10 +51,10 @@ pub struct Door {
 impl Door {
     /// With the queue behind it.
     pub fn new(board: Arc<Board>, config: &ServerConfig) -> (Self, Receiver<Arrival>) {
-        let (queue, arrivals) = sync_channel(config.queue_messages);
+        let (queue, arrivals) = sync_channel(config.limits.queue_messages);
         let _ = board.control.set(queue.clone());
         let payload_max_bytes = config.limits.payload_bytes;
-        (Self { queue, board, payload_max_bytes, queue_max_bytes: config.queue_bytes }, arrivals)
+        (Self { queue, board, payload_max_bytes, queue_max_bytes: config.limits.queue_bytes }, arrivals)
     }
 
     /// For Zenoh's callbacks.
@@ -65,21 +65,23 @@ impl Door {
         let (key, bytes) = (sample.key_expr().to_string(), sample.payload().len());
         let waiting = self.board.queued_bytes.fetch_add(bytes, Ordering::Relaxed);
         if waiting + bytes > self.queue_max_bytes {
-            return self.overrun(bytes);
+            return self.overrun("queue_bytes", bytes);
         }
         let arrival = if bytes > self.payload_max_bytes {
+            self.board.reach("payload_bytes");
             Arrival::TooLarge { key, bytes }
         } else {
             let encoding = sample.encoding().to_string();
             Arrival::Payload { key, encoding, bytes: sample.payload().to_bytes().into_owned() }
         };
         if self.queue.try_send(arrival).is_err() {
-            self.overrun(bytes);
+            self.overrun("queue_messages", bytes);
         }
     }
 
     /// There is no room: what is dropped was acknowledged to nobody.
-    fn overrun(&self, bytes: usize) {
+    fn overrun(&self, limit: &'static str, bytes: usize) {
+        self.board.reach(limit);
         self.board.queued_bytes.fetch_sub(bytes, Ordering::Relaxed);
         let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
         // The first, and then each doubling: a flood must not flood the log.

@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use toponym_proto::answer::{Ack, Counts, ErrorCode, Problem, RobotState};
 use toponym_proto::codec::place_of;
 use toponym_proto::keys::{ANY_ROBOT, Input, check_key};
+use toponym_proto::limits::WAITING_SENTENCES_MAX;
 use toponym_proto::{Keys, Message, Refused, Say};
 use tracing::{error, warn};
 
@@ -34,12 +35,8 @@ const BATCH: usize = 256;
 const FEW: u64 = 16;
 /// How long a sentence waits for a robot that was never heard: its guide may be faster.
 const ROBOT_WAIT: Duration = Duration::from_secs(2);
-/// Bytes of all robots' messages that wait for those before them, or for room in their maps: each robot may have its share …
-const WAITING_MAX_BYTES: usize = 256 << 20;
-/// … as if there were at least so many.
+/// A robot has no larger share of what may wait than as if there were so many.
 const ROBOTS_LEAST: usize = 8;
-/// Sentences that wait so.
-const WAITING_MAX: usize = 64;
 
 /// A sentence whose robot was never heard.
 struct WaitingSay {
@@ -189,8 +186,9 @@ impl Intake {
     /// The robot's state, made at need; none if there are too many robots already.
     fn robot(&mut self, id: &str) -> Option<&mut Robot> {
         if !self.robots.contains_key(id) {
-            if self.robots.len() >= self.config.robots_max && !self.forget_a_stranger() {
-                error!(robot = id, robots_max = self.config.robots_max, "refused: too many robots");
+            if self.robots.len() >= self.config.limits.robots && !self.forget_a_stranger() {
+                error!(robot = id, robots = self.config.limits.robots, "refused: too many robots");
+                self.board.reach("robots");
                 return None;
             }
             let robot = Robot::new(id, &self.config, self.maps.saved(id));
@@ -218,12 +216,13 @@ impl Intake {
     fn take_message(&mut self, id: &str, key: &str, message: Message) {
         let robots = self.robots.len();
         let now = self.now();
+        // Robots that leave gaps may fill what is theirs, and no more.
+        let share_bytes = self.config.limits.waiting_bytes / robots.max(ROBOTS_LEAST);
         let Some(robot) = self.robot(id) else {
             return;
         };
-        // Robots that leave gaps may fill what is theirs, and no more.
-        let share_bytes = WAITING_MAX_BYTES / robots.max(ROBOTS_LEAST);
         if robot.is_full(share_bytes) {
+            self.board.reach("waiting_bytes");
             let overrun = self.board.overrun.fetch_add(1, Ordering::Relaxed) + 1;
             if overrun.is_power_of_two() {
                 error!(key, overrun, "the map can't keep up: messages are dropped, to be sent again");
@@ -272,7 +271,9 @@ impl Intake {
                 return self.answer_say(&robot, &say.id, problem);
             }
             _ => {
-                if self.now().saturating_sub(arrived) < ROBOT_WAIT && self.waiting.len() < WAITING_MAX {
+                if self.now().saturating_sub(arrived) < ROBOT_WAIT
+                    && self.waiting.len() < WAITING_SENTENCES_MAX
+                {
                     self.waiting.push(WaitingSay { arrived, robot, say });
                     return;
                 }

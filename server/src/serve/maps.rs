@@ -129,11 +129,12 @@ impl Maps {
                 .field("map")
                 .hint("one robot maps a map: give this one another map in its setup"));
         }
-        if maps.len() >= self.config.maps_max {
+        if maps.len() >= self.config.limits.maps {
+            self.board.reach("maps");
             let message = format!("there are {} maps already", maps.len());
             return Err(Problem::new(ErrorCode::TooLarge, message)
                 .field("map")
-                .hint("raise maps_max in the server's configuration"));
+                .hint("raise limits.maps in the server's configuration"));
         }
         let card = Card { uuid: new_uuid(), robot: robot.clone(), watermark: None, stamp_ns: 0 };
         let fold = Fold::new(Mapper::new(self.config.mapper.clone()), card, self.hold());

@@ -48,9 +48,10 @@ use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
 use std::time::Duration;
-use toponym_proto::Keys;
 use toponym_proto::answer::{ErrorCode, ErrorReply, Problem};
 use toponym_proto::codec::ENCODING_JSON;
+use toponym_proto::limits::REFUSED_QUERIES_MAX;
+use toponym_proto::{Keys, Limits};
 use tracing::{info, warn};
 use zenoh::query::Query;
 use zenoh::{Session, Wait};
@@ -58,9 +59,6 @@ use zenoh_ext::{AdvancedSubscriberBuilderExt, HistoryConfig, RecoveryConfig};
 
 /// How long a robot's cache may take to answer.
 const HISTORY_WAIT: Duration = Duration::from_secs(2);
-
-/// Queries that wait to be told that there are too many.
-const REFUSED_MAX: usize = 4096;
 
 /// The server can't start or stop.
 #[derive(Debug, thiserror::Error)]
@@ -142,11 +140,12 @@ impl Server {
         let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, records);
         maps.start_saved()?;
         let (door, arrivals) = Door::new(board.clone(), &config);
+        let limits = config.limits.clone();
         let intake = Intake::new(config, board.clone(), outbox.clone(), maps);
         let intake =
             std::thread::Builder::new().name("intake".into()).spawn(move || intake.run(&arrivals))?;
         subscribe(&session, &keys, &door).await?;
-        answer_queries(&session, &board).await?;
+        answer_queries(&session, &board, &limits).await?;
         let token = session.liveliness().declare_token(keys.alive(&session.zid().to_string())).await?;
         watchers.push(watch::tell_systemd(board.clone()));
         let server =
@@ -231,12 +230,12 @@ async fn subscribe(session: &Session, keys: &Keys, door: &Door) -> Result<(), ze
         .await
 }
 
-async fn answer_queries(session: &Session, board: &Arc<Board>) -> Result<(), ServeError> {
+async fn answer_queries(session: &Session, board: &Arc<Board>, limits: &Limits) -> Result<(), ServeError> {
     let board = board.clone();
-    let permits = queries::Permits::default();
+    let permits = queries::Permits::new(limits);
     let runtime = tokio::runtime::Handle::current();
     // Not by the callback: a reply waits for who reads slowly, and with it all who are read by the same thread.
-    let (refuse, refused) = sync_channel::<Query>(REFUSED_MAX);
+    let (refuse, refused) = sync_channel::<Query>(REFUSED_QUERIES_MAX);
     std::thread::Builder::new().name("refuse".into()).spawn(move || {
         while let Ok(query) = refused.recv() {
             reply_problem(&query, Problem::new(ErrorCode::Busy, "too many queries: try again"));
@@ -253,7 +252,10 @@ async fn answer_queries(session: &Session, board: &Arc<Board>) -> Result<(), Ser
                 });
             }
             // One that finds no room is not answered, and asked again.
-            None => drop(refuse.try_send(query)),
+            None => {
+                board.reach("queries");
+                drop(refuse.try_send(query));
+            }
         })
         .background()
         .await?;

@@ -37,13 +37,6 @@ pub fn askable(board: &Board) -> Vec<String> {
     keys
 }
 
-/// Queries answered at the same time; more get `busy`.
-const LIGHT_MAX: usize = 64;
-/// The same for those that take long.
-const HEAVY_MAX: usize = 2;
-/// The same for commands, which wait for a map's filter and may not keep grids from being made.
-const COMMANDS_MAX: usize = 2;
-
 /// What bounds the queries answered at the same time, kind by kind.
 pub struct Permits {
     light: Arc<Semaphore>,
@@ -51,14 +44,17 @@ pub struct Permits {
     commands: Arc<Semaphore>,
 }
 
-impl Default for Permits {
-    fn default() -> Self {
-        let of = |permits| Arc::new(Semaphore::new(permits));
-        Self { light: of(LIGHT_MAX), heavy: of(HEAVY_MAX), commands: of(COMMANDS_MAX) }
-    }
-}
-
 impl Permits {
+    /// As many as the limits say. Commands may not keep grids from being made.
+    pub fn new(limits: &Limits) -> Self {
+        let of = |permits| Arc::new(Semaphore::new(permits));
+        Self {
+            light: of(limits.short_queries),
+            heavy: of(limits.long_queries),
+            commands: of(limits.commands),
+        }
+    }
+
     /// A permit to answer a query on this key, which may have wildcards; none if there are too many
     /// of its kind. Holds until it is dropped.
     pub fn take(&self, key: &str) -> Option<OwnedSemaphorePermit> {
@@ -349,9 +345,9 @@ mod tests {
     #[test]
     fn a_wildcard_counts_as_the_grid_it_may_select() {
         for wild in ["t/v1/s/map/*/ask/*", "t/v1/s/map/main/ask/g$*", "t/v1/s/**"] {
-            let permits = Permits::default();
+            let permits = Permits::new(&Limits::DEFAULT);
             let held = exhaust(&permits, "t/v1/s/map/main/ask/grid");
-            assert_eq!(held.len(), HEAVY_MAX);
+            assert_eq!(held.len(), Limits::DEFAULT.long_queries);
             assert!(permits.take(wild).is_none(), "{wild}");
             assert!(permits.take("t/v1/s/map/main/ask/where").is_some());
         }
@@ -359,9 +355,9 @@ mod tests {
 
     #[test]
     fn saving_keeps_nobody_from_asking() {
-        let permits = Permits::default();
+        let permits = Permits::new(&Limits::DEFAULT);
         let saves = exhaust(&permits, "t/v1/s/do/save");
-        assert_eq!(saves.len(), COMMANDS_MAX);
+        assert_eq!(saves.len(), Limits::DEFAULT.commands);
         assert!(permits.take("t/v1/s/map/main/ask/grid").is_some());
         assert!(permits.take("t/v1/s/map/main/ask/where").is_some());
         drop(saves);

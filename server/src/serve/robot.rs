@@ -19,9 +19,6 @@ use crate::config::ServerConfig;
 /// Finds the map that a setup names, or says why the robot can't have it.
 pub type FindMap<'a> = dyn FnMut(&Setup) -> Result<Arc<MapView>, Problem> + 'a;
 
-/// Bytes on their way to a filter; what comes then waits with its robot, and is not acknowledged.
-const BACKLOG_MAX_BYTES: usize = 32 << 20;
-
 /// A sentence that began so long before or after all that has arrived of its robot is on another clock. A stream that is
 /// played fast may be minutes behind its sentences.
 const CLOCK_MAX_S: f64 = 900.0;
@@ -51,6 +48,7 @@ pub struct Robot {
     /// Why the last refused message was refused.
     refusal: Option<Problem>,
     queue_messages: usize,
+    backlog_max_bytes: usize,
 }
 
 impl Robot {
@@ -77,7 +75,8 @@ impl Robot {
             counts: Counts::default(),
             no_map: None,
             refusal: None,
-            queue_messages: config.queue_messages,
+            queue_messages: config.limits.queue_messages,
+            backlog_max_bytes: config.limits.backlog_bytes,
         }
     }
 
@@ -137,7 +136,7 @@ impl Robot {
         let stopped = || Problem::new(ErrorCode::Internal, "the map has stopped: see the server's log");
         let busy = || Problem::new(ErrorCode::Busy, "the map can't keep up: say it again later");
         let map = self.map.as_ref().ok_or_else(stopped)?;
-        match hand(map, Event::Say { boot, say }) {
+        match hand(map, Event::Say { boot, say }, self.backlog_max_bytes) {
             Ok(()) => Ok(()),
             Err(TrySendError::Full(_)) => Err(busy()),
             Err(TrySendError::Disconnected(_)) => Err(stopped()),
@@ -237,7 +236,7 @@ impl Robot {
             }
             return None;
         };
-        match hand(map, event) {
+        match hand(map, event, self.backlog_max_bytes) {
             Ok(()) => {
                 self.counts.taken += u64::from(is_message);
                 self.handed = self.handed.max(last);
@@ -328,9 +327,9 @@ impl Robot {
 /// Hands something to a map's journal, if there is room.
 // What can't be handed over comes back, as it does from a channel.
 #[allow(clippy::result_large_err)]
-fn hand(map: &MapView, event: Event) -> Result<(), TrySendError<Event>> {
+fn hand(map: &MapView, event: Event, backlog_max_bytes: usize) -> Result<(), TrySendError<Event>> {
     let bytes = bytes_of(&event);
-    if map.backlog_bytes.load(Ordering::Relaxed) + bytes > BACKLOG_MAX_BYTES {
+    if map.backlog_bytes.load(Ordering::Relaxed) + bytes > backlog_max_bytes {
         return Err(TrySendError::Full(event));
     }
     map.backlog_bytes.fetch_add(bytes, Ordering::Relaxed);

@@ -35,6 +35,7 @@ pub fn info(board: &Board) -> Info {
         work: maps.values().map(|map| work(map)).collect(),
         broken: lock(&board.broken).values().cloned().collect(),
         machine: machine(board),
+        reached: lock(&board.reached).iter().map(|(limit, times)| ((*limit).to_owned(), *times)).collect(),
     }
 }
 
@@ -97,6 +98,9 @@ fn metrics(board: &Board) -> Result<String, std::fmt::Error> {
     counters(&mut registry, "robot_messages_lost", "Messages that never came: data loss", robots(|c| c.lost));
     counters(&mut registry, "robot_messages_unused", "Messages of no use to the map", robots(|c| c.unused));
     counters(&mut registry, "overrun", "Messages dropped at the door", vec![(vec![], info.overrun)]);
+    let reached =
+        info.reached.iter().map(|(limit, times)| (vec![("limit", limit.clone())], *times)).collect();
+    counters(&mut registry, "limit_reached", "How often a limit was reached", reached);
     let maps = |value: fn(&MapWork) -> f64| -> Vec<(Labels, f64)> {
         info.work.iter().map(|m| (vec![("map", m.map.clone())], value(m))).collect()
     };

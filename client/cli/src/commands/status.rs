@@ -68,6 +68,11 @@ fn told(info: &Info, took: Duration) -> String {
     let left =
         left.iter().filter_map(|(what, bytes)| Some(format!("{what} {:.1} GB", (*bytes)? as f64 / 1e9)));
     let _ = writeln!(text, "left   {}", left.collect::<Vec<_>>().join(", "));
+    if !info.reached.is_empty() {
+        let reached: Vec<String> =
+            info.reached.iter().map(|(limit, times)| format!("{limit} {times}×")).collect();
+        let _ = writeln!(text, "limits reached: {}", reached.join(", "));
+    }
     if info.overrun > 0 {
         let _ = writeln!(text, "{} messages were dropped because they came too fast", info.overrun);
     }
@@ -102,10 +107,11 @@ mod tests {
                 ..MapWork::default()
             }],
             broken: vec![],
+            reached: [("maps".to_owned(), 2)].into(),
             machine: Machine { disk_left_bytes: Some(2_500_000_000), ..Machine::default() },
         };
         let all = told(&info(well.clone(), None), Duration::ZERO);
-        assert!(all.ends_with("left   disk 2.5 GB\nall is well\n"), "{all}");
+        assert!(all.ends_with("left   disk 2.5 GB\nlimits reached: maps 2×\nall is well\n"), "{all}");
         let full = told(&info(well.clone(), Some("no space left")), Duration::ZERO);
         assert!(full.contains("TROUBLE  map main: no space left"), "{full}");
         let ill = RobotState { counts: Counts { lost: 3, ..Counts::default() }, ..well };
