@@ -243,17 +243,16 @@ async fn answer_queries(session: &Session, board: &Arc<Board>, limits: &Limits) 
     })?;
     session
         .declare_queryable(board.keys.everything())
-        .callback(move |query| match permits.take(query.key_expr().as_str()) {
-            Some(permit) => {
+        .callback(move |query| {
+            if let Some(permit) = permits.take(query.key_expr().as_str()) {
                 let board = board.clone();
                 runtime.spawn_blocking(move || {
                     reply_to(&board, &query);
                     drop(permit);
                 });
-            }
-            // One that finds no room is not answered, and asked again.
-            None => {
+            } else {
                 board.reach("queries");
+                // One that finds no room is not answered, and asked again.
                 drop(refuse.try_send(query));
             }
         })

@@ -1,11 +1,13 @@
 //! A robot that drives and a guide that talks, whatever happens to their server; and the server.
 
+use std::collections::BTreeMap;
 use std::net::TcpListener;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
 use toponym::{Connection, Guide, Planner, Robot, RobotConfig};
+use toponym_proto::answer::{Heard, HeardStatus};
 use toponym_proto::record::RecordReader;
 use toponym_proto::{Clock, Message, Stamp};
 use toponym_sim::hall::{PERIOD_NS, message};
@@ -113,6 +115,9 @@ pub struct Drive {
     session: zenoh::Session,
     pub robot: Robot,
     guide: Guide,
+    feedback: tokio::sync::broadcast::Receiver<Heard>,
+    /// What became of sentences, by id.
+    heard: BTreeMap<String, Heard>,
     pub sent: u64,
     pub said: u64,
     /// The highest watermark that was ever told.
@@ -129,9 +134,12 @@ impl Drive {
     pub async fn begin_as(connection: &Connection) -> Self {
         let session = connected(connection).await;
         let config = RobotConfig { clock: Clock::Log, boot: 1, ..RobotConfig::new("r1") };
+        let guide = Guide::connect(&session, "default", Some("r1")).await.unwrap();
         Self {
             robot: Robot::connect(&session, config).await.unwrap(),
-            guide: Guide::connect(&session, "default", Some("r1")).await.unwrap(),
+            feedback: guide.feedback(),
+            heard: BTreeMap::new(),
+            guide,
             session,
             sent: 0,
             said: 0,
@@ -145,6 +153,14 @@ impl Drive {
         let planner = Planner::new(&self.session, "default", "main", PATIENCE).unwrap();
         planner.save().await.unwrap();
         let told: u64 = planner.labels().await.unwrap().labels.iter().map(|l| l.utterances).sum();
+        let others: Vec<&Heard> =
+            self.heard.values().filter(|h| h.status != HeardStatus::Understood).collect();
+        assert!(
+            others.is_empty(),
+            "{} sentences came to something else, such as {:?}",
+            others.len(),
+            others[0]
+        );
         assert_eq!(told, self.said, "sentences in the map, and said");
         check_record(&server.folder.join("run.rec"), &self);
     }
@@ -176,6 +192,7 @@ impl Drive {
             self.guide.publish(&say).await.unwrap();
             self.said += 1;
         }
+        self.hear();
         if let Some(ack) = self.robot.acked() {
             assert!(ack.seq >= self.acked, "the watermark fell from {} to {}", self.acked, ack.seq);
             assert_eq!(ack.lost, 0);
@@ -184,14 +201,24 @@ impl Drive {
         tokio::time::sleep(PERIOD).await;
     }
 
+    /// Notes what became of sentences.
+    fn hear(&mut self) {
+        while let Ok(heard) = self.feedback.try_recv() {
+            if heard.status != HeardStatus::Read {
+                self.heard.insert(heard.id.clone(), heard);
+            }
+        }
+    }
+
     /// All is acknowledged, and heard.
     async fn settle(&mut self) {
-        let mut feedback = self.guide.feedback();
         self.robot.settle().await.unwrap();
+        let mut feedback = self.guide.feedback();
         while self.guide.unheard() > 0 {
             let heard = tokio::time::timeout(PATIENCE, feedback.recv()).await;
             assert!(heard.is_ok(), "{} sentences are not heard", self.guide.unheard());
         }
+        self.hear();
     }
 }
 
