@@ -26,6 +26,8 @@ const RECORD_SYNC: Duration = Duration::from_millis(200);
 const SNAPSHOT_PERIOD: Duration = Duration::from_millis(100);
 /// A checkpoint is due after so much of the filter's work: a restart does it again …
 const SAVE_WORK: Duration = Duration::from_secs(2);
+/// … of so much while it recovers …
+const RECOVER_WORK: Duration = Duration::from_millis(300);
 /// … and after so long in any case, if anything came.
 const SAVE_PERIOD: Duration = Duration::from_secs(60);
 
@@ -112,6 +114,7 @@ impl Mapping {
     /// their guides wait.
     fn recover(&mut self, tail: Vec<(u64, Entry)>) {
         let (began, entries) = (Instant::now(), tail.len());
+        let mut last = began;
         for (index, entry) in tail {
             let Self { fold, record, outbox, view, board, .. } = &mut *self;
             fold.take(entry, &mut |outcome| match outcome {
@@ -122,6 +125,14 @@ impl Mapping {
             self.index = index;
             if self.view.is_late() {
                 return;
+            }
+            // One that is killed before it has done so much would never get further.
+            self.saver.worked(last.elapsed());
+            last = Instant::now();
+            if self.saver.is_due(index, RECOVER_WORK, SAVE_PERIOD)
+                && let Err(e) = self.begin_save()
+            {
+                error!(map = self.view.id, "no checkpoint: {e}");
             }
         }
         if entries > 0 {

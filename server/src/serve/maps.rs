@@ -8,8 +8,8 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use toponym_core::Mapper;
 use toponym_journal::{Entry, Event, Folder, Journal};
-use toponym_proto::Setup;
 use toponym_proto::answer::{ErrorCode, Problem};
+use toponym_proto::{Setup, Stamp};
 use tracing::{error, info, warn};
 
 use super::board::{Board, MapView, lock};
@@ -29,6 +29,17 @@ const STEPS: usize = 1024;
 /// How long the filters may go on when the server stops; what they leave is in their journals.
 const STOP_WAIT: Duration = Duration::from_secs(3);
 
+/// What is known of a robot of an earlier run.
+#[derive(Clone)]
+pub struct Saved {
+    /// The map it was on last.
+    pub map: Arc<MapView>,
+    /// (boot, seq) of the last of its messages that is on disk, or given up.
+    pub watermark: (u64, u64),
+    /// Newest stamp of those.
+    pub newest: Stamp,
+}
+
 /// The maps and their threads.
 pub struct Maps {
     config: ServerConfig,
@@ -38,8 +49,8 @@ pub struct Maps {
     records: Option<Recordings>,
     /// Each with its map.
     threads: Vec<(String, JoinHandle<Result<(), String>>)>,
-    /// The saved map of each robot that it was on last, and (boot, seq) of the last message in it.
-    saved: BTreeMap<String, (Arc<MapView>, (u64, u64))>,
+    /// The saved map of each robot that it was on last.
+    saved: BTreeMap<String, Saved>,
 }
 
 /// A map to be started.
@@ -92,13 +103,19 @@ impl Maps {
         }
         *old = new;
         let watermark = tail.iter().filter_map(|(_, entry)| entry.watermark()).max().max(fold.card.watermark);
+        // What has arrived, not what the filter has taken in: it may be far behind.
+        let stamp = |(_, entry): &(u64, Entry)| match &entry.event {
+            Event::Message(message) => Some(message.header()?.stamp),
+            _ => None,
+        };
+        let newest = tail.iter().rev().find_map(stamp).unwrap_or(Stamp { ns: fold.card.stamp_ns });
         info!(map = id, robot = fold.card.robot, entries = tail.len(), "loaded");
         let robot = fold.card.robot.clone();
         let view = self.start(id, Start { fold, tail, journal }, watermark).map_err(|e| e.to_string())?;
         if let Some(watermark) = watermark
-            && self.saved.get(&robot).is_none_or(|(_, known)| *known < watermark)
+            && self.saved.get(&robot).is_none_or(|known| known.watermark < watermark)
         {
-            self.saved.insert(robot, (view, watermark));
+            self.saved.insert(robot, Saved { map: view, watermark, newest });
         }
         Ok(())
     }
@@ -109,7 +126,7 @@ impl Maps {
     }
 
     /// The map that a robot was on in an earlier run, and how far it got.
-    pub fn saved(&self, robot: &str) -> Option<(Arc<MapView>, (u64, u64))> {
+    pub fn saved(&self, robot: &str) -> Option<Saved> {
         self.saved.get(robot).cloned()
     }
 
@@ -215,7 +232,7 @@ impl Maps {
         if let Some(view) = view {
             *lock(&view.stops_at) = Some(Instant::now());
             let _ = view.work.send(Work::Stop);
-            self.saved.retain(|_, (saved, _)| saved.id != id);
+            self.saved.retain(|_, saved| saved.map.id != id);
             self.board.remove_map(id);
         }
         self.join(|of| of == id);

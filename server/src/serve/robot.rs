@@ -13,6 +13,7 @@ use tracing::{error, info};
 
 use super::board::{MapView, lock};
 use super::mapping::bytes_of;
+use super::maps::Saved;
 use super::scribe::Work;
 use crate::config::ServerConfig;
 
@@ -52,10 +53,10 @@ pub struct Robot {
 }
 
 impl Robot {
-    /// `saved`: its map of an earlier run, and (boot, seq) of the last message in it; the robot need
+    /// `saved`: of an earlier run; the robot need
     /// not present itself again.
-    pub fn new(id: &str, config: &ServerConfig, saved: Option<(Arc<MapView>, (u64, u64))>) -> Self {
-        let (map, watermark) = saved.unzip();
+    pub fn new(id: &str, config: &ServerConfig, saved: Option<Saved>) -> Self {
+        let watermark = saved.as_ref().map(|saved| saved.watermark);
         let patience = Patience {
             join_wait: Duration::from_secs_f64(config.join_wait_s),
             gap_wait: Duration::from_secs_f64(config.gap_wait_s),
@@ -67,8 +68,8 @@ impl Robot {
             parked: None,
             heard_at: Duration::ZERO,
             first: None,
-            newest: map.as_ref().map(|map| map.stamp()),
-            map,
+            newest: saved.as_ref().map(|saved| saved.newest),
+            map: saved.map(|saved| saved.map),
             boot: watermark.map(|w| w.0),
             handed: watermark,
             acked: watermark,

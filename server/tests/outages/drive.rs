@@ -6,6 +6,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::time::{Duration, Instant};
+use tokio::sync::broadcast::error::TryRecvError;
+use toponym::guide::is_final;
 use toponym::{Connection, Guide, Planner, Robot, RobotConfig};
 use toponym_proto::answer::{Heard, HeardStatus};
 use toponym_proto::record::RecordReader;
@@ -203,9 +205,11 @@ impl Drive {
 
     /// Notes what became of sentences.
     fn hear(&mut self) {
-        while let Ok(heard) = self.feedback.try_recv() {
-            if heard.status != HeardStatus::Read {
-                self.heard.insert(heard.id.clone(), heard);
+        loop {
+            match self.feedback.try_recv() {
+                Ok(heard) if is_final(&heard) => drop(self.heard.insert(heard.id.clone(), heard)),
+                Ok(_) | Err(TryRecvError::Lagged(_)) => {}
+                Err(_) => return,
             }
         }
     }
