@@ -218,7 +218,8 @@ impl<R: Read> RecordReader<R> {
         }
         let message = Message::from_bincode(&payload, &Limits::NONE)
             .map_err(|source| RecordError::Message { index, offset, source })?;
-        self.index += 1;
+        let none_left = || RecordError::Damaged { offset, why: "no number is left for the next".into() };
+        self.index = index.checked_add(1).ok_or_else(none_left)?;
         Ok(Some((offset, message)))
     }
 }

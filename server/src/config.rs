@@ -159,6 +159,26 @@ impl ServerConfig {
                 return Err(Invalid::new(field, "is 0, must be at least 1").into());
             }
         }
+        for (field, value, range) in [
+            ("mapper.place_spacing_m", self.mapper.place_spacing_m, 0.1..=100.0),
+            ("mapper.gamma_per_m2", self.mapper.gamma_per_m2, 0.0..=1e3),
+            ("mapper.particles", f64::from(self.mapper.particles), 1.0..=10_000.0),
+            ("limits.payload_bytes", self.limits.payload_bytes as f64, 1.0..=1e9),
+            ("limits.lasers", self.limits.lasers as f64, 1.0..=1e3),
+            ("limits.queue_messages", self.limits.queue_messages as f64, 1.0..=1e7),
+        ] {
+            if !range.contains(&value) {
+                let message = format!("is {value}, must be from {} to {}", range.start(), range.end());
+                return Err(Invalid::new(field, message).into());
+            }
+        }
+        if let Some(http) = &self.http
+            && http
+                .rsplit_once(':')
+                .is_none_or(|(host, port)| host.is_empty() || port.parse::<u16>().is_err())
+        {
+            return Err(Invalid::new("http", format!("is {http:?}, must be such as 127.0.0.1:7458")).into());
+        }
         Ok(())
     }
 }

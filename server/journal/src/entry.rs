@@ -47,6 +47,9 @@ pub enum EntryError {
     /// Too short.
     #[error("an entry of {0} bytes")]
     Short(usize),
+    /// Too long.
+    #[error("{0} bytes too many")]
+    Long(usize),
     /// The message in it can't be read.
     #[error(transparent)]
     Message(#[from] Refused),
@@ -96,15 +99,18 @@ impl Entry {
         let short = || EntryError::Short(bytes.len());
         let u64_at = |at| toponym_proto::frame::u64_at(bytes, at).ok_or_else(short);
         let body = |at| bytes.get(at..).ok_or_else(short);
+        // What a message does not read of its own is told by its form.
+        let ends =
+            |at: usize| if bytes.len() > at { Err(EntryError::Long(bytes.len() - at)) } else { Ok(()) };
         let event = match bytes.get(8).ok_or_else(short)? {
             1 => Event::Message(Message::from_bincode(body(9)?, &Limits::NONE)?),
             2 => match Message::from_bincode(body(17)?, &Limits::NONE)? {
                 Message::Say(say) => Event::Say { boot: u64_at(9)?, say },
                 _ => return Err(EntryError::Kind(2)),
             },
-            3 => Event::Gap { boot: u64_at(9)?, to: u64_at(17)? },
-            4 => Event::Tick,
-            5 => Event::Hold(u64_at(9)?),
+            3 => ends(25).and(Ok(Event::Gap { boot: u64_at(9)?, to: u64_at(17)? }))?,
+            4 => ends(9).and(Ok(Event::Tick))?,
+            5 => ends(17).and(Ok(Event::Hold(u64_at(9)?)))?,
             kind => return Err(EntryError::Kind(*kind)),
         };
         Ok(Self { at_ns: u64_at(0)?, event })

@@ -143,7 +143,8 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Segment, JournalError> {
     let (identity, salt) = identity(name, bytes, HEAD_AT, first)?;
     let slots = SLOTS_AT.map(|at| {
         let (durable, crc) = (u64_at(bytes, at)?, u32_at(bytes, at + 8)?);
-        (slot_checksum(salt, durable) == crc && durable + 1 >= first).then_some(durable)
+        (slot_checksum(salt, durable) == crc && durable.checked_add(1).is_some_and(|next| next >= first))
+            .then_some(durable)
     });
     let Some(durable) = slots.iter().flatten().max().copied() else {
         return Err(damaged(SLOTS_AT[0], "neither slot tells what is durable"));

@@ -8,7 +8,7 @@ use std::io::{ErrorKind, Write as _};
 use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, chown};
 use std::path::{Path, PathBuf};
 use toponym_proto::Invalid;
-use toponym_proto::keys::check_id;
+use toponym_proto::keys::{ANY_ROBOT, check_id};
 
 /// What a user is to the server.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, clap::ValueEnum)]
@@ -125,6 +125,12 @@ impl Policy {
             check_id("user", name)?;
             for robot in &user.robots {
                 check_id("robots", robot)?;
+                if robot == ANY_ROBOT {
+                    return Err(Invalid::new(
+                        "robots",
+                        format!("\"{ANY_ROBOT}\" is no robot's id: it is reserved"),
+                    ));
+                }
             }
             if user
                 .password
