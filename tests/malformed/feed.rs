@@ -96,6 +96,8 @@ pub struct Outcome {
     pub told: String,
 }
 
+// Errors of many kinds are handed over where they arise.
+#[allow(clippy::needless_pass_by_value)]
 fn came(came: Came, told: impl ToString) -> Outcome {
     Outcome { came, told: told.to_string() }
 }
@@ -105,17 +107,21 @@ pub fn feed(fed: &Fed) -> Outcome {
     let fed = match fed {
         Fed::Wire(key, encoding, bytes) => wire(key, encoding, bytes),
         Fed::Message(bytes) => message(Message::from_bincode(bytes, &Limits::default())),
-        Fed::Key(key) => keys().input(key).map_err(invalid).map(|(robot, input)| format!("{robot}, {input:?}")),
+        Fed::Key(key) => {
+            keys().input(key).map_err(invalid).map(|(robot, input)| format!("{robot}, {input:?}"))
+        }
         Fed::Selector(text, payload) => {
             selector::decode(text, payload).map_err(invalid).map(|arguments| format!("{arguments:?}"))
         }
         Fed::Settings(bytes) => settings(bytes),
         Fed::Users(bytes) => users(bytes),
         Fed::Record(bytes) => record(bytes),
-        Fed::Carmen(bytes) => {
-            CarmenLog::new(bytes.clone(), &Options::default(), Notes::default()).map_err(log_error).map(drained)
-        }
-        Fed::Log(bytes) => with_file(bytes, |path| log::open(path, &Options::default()).map_err(log_error).map(drained)),
+        Fed::Carmen(bytes) => CarmenLog::new(bytes.clone(), &Options::default(), Notes::default())
+            .map_err(log_error)
+            .map(|mut log| drained(&mut log)),
+        Fed::Log(bytes) => with_file(bytes, |path| {
+            log::open(path, &Options::default()).map_err(log_error).map(|mut log| drained(log.as_mut()))
+        }),
         Fed::Narration(bytes) => narration(bytes),
         Fed::Sentence(text) => sentence(text),
         Fed::Entry(bytes) => Entry::from_bytes(bytes).map_err(entry_error).map(|entry| format!("{entry:?}")),
@@ -209,8 +215,11 @@ fn log_error(e: LogError) -> Outcome {
     }
 }
 
-fn drained(mut log: impl Records) -> String {
-    let read = log.by_ref().count();
+fn drained(log: &mut dyn Records) -> String {
+    let mut read = 0;
+    while log.next().is_some() {
+        read += 1;
+    }
     let notes = log.notes();
     format!("{read} messages, {} scans; {}", notes.scans, notes.warnings().join("; "))
 }
@@ -237,6 +246,7 @@ fn entry_error(e: EntryError) -> Outcome {
     match e {
         EntryError::Kind(kind) => came(Came::UnknownKind, kind),
         EntryError::Short(bytes) => came(Came::Short, bytes),
+        EntryError::Long(_) => came(Came::Malformed, e),
         EntryError::Message(e) => refused(e),
     }
 }

@@ -22,4 +22,5 @@ mod seeds;
 mod settings;
 mod table;
 mod wire_bincode;
+mod wire_bytes;
 mod wire_json;

