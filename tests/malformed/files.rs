@@ -211,24 +211,3 @@ fn a_record_that_breaks_off_lacks_only_what_is_cut() {
         }
     }
 }
-
-#[test]
-fn temp_raised() {
-    use toponym_proto::{Limits, Message, keys::Input};
-    let limits = Limits { payload_bytes: 60 << 20, beams: usize::MAX, ..Limits::default() };
-    for n in [4_190_000_usize, 4_200_000] {
-        let mut text = String::from_utf8(Message::Scan(crate::seeds::scan()).to_json().unwrap()).unwrap();
-        let many = "0,".repeat(n);
-        text = text.replace("[1.5", &format!("[{many}1.5"));
-        let input = Input::Scan { laser: "front".into() };
-        let m = Message::decode(&input, "", text.as_bytes(), &limits).unwrap();
-        let entry = toponym_journal::Entry { at_ns: 0, event: toponym_journal::Event::Message(m) };
-        let bytes = entry.to_bytes().unwrap();
-        println!(
-            "{n} {} json, {} bincode: {:?}",
-            text.len(),
-            bytes.len(),
-            toponym_journal::Entry::from_bytes(&bytes).map(|_| ())
-        );
-    }
-}
