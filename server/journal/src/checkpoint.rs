@@ -39,7 +39,8 @@ pub fn name(index: u64) -> String {
 
 /// Entry after which the checkpoint of this name was made.
 pub fn index_of(name: &str) -> Option<u64> {
-    name.strip_suffix(".checkpoint").filter(|digits| digits.len() == 20)?.parse().ok()
+    let digits = name.strip_suffix(".checkpoint").filter(|digits| digits.len() == 20)?;
+    digits.parse().ok().filter(|index| *index <= crate::segment::INDEX_MAX)
 }
 
 impl Checkpoint {

@@ -31,9 +31,13 @@ pub fn name(first: u64) -> String {
     format!("{first:020}.journal")
 }
 
+/// No journal is that long: a number beyond is forged.
+pub const INDEX_MAX: u64 = 1 << 62;
+
 /// First entry of the segment of this name.
 pub fn first_of(name: &str) -> Option<u64> {
-    name.strip_suffix(".journal").filter(|digits| digits.len() == 20)?.parse().ok()
+    let digits = name.strip_suffix(".journal").filter(|digits| digits.len() == 20)?;
+    digits.parse().ok().filter(|first| *first <= INDEX_MAX)
 }
 
 fn slot(salt: u32, durable: u64) -> [u8; 12] {
@@ -143,7 +147,7 @@ pub fn read(name: &str, bytes: &[u8]) -> Result<Segment, JournalError> {
     let (identity, salt) = identity(name, bytes, HEAD_AT, first)?;
     let slots = SLOTS_AT.map(|at| {
         let (durable, crc) = (u64_at(bytes, at)?, u32_at(bytes, at + 8)?);
-        (slot_checksum(salt, durable) == crc && durable.checked_add(1).is_some_and(|next| next >= first))
+        (slot_checksum(salt, durable) == crc && durable <= INDEX_MAX && durable + 1 >= first)
             .then_some(durable)
     });
     let Some(durable) = slots.iter().flatten().max().copied() else {
