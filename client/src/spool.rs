@@ -6,8 +6,7 @@
 
 use std::collections::VecDeque;
 use std::fs::{self, File, OpenOptions};
-use std::io::{self, ErrorKind, Write as _};
-use std::os::unix::fs::FileExt as _;
+use std::io::{self, ErrorKind, Read as _, Seek as _, SeekFrom, Write as _};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 use toponym_proto::frame::{self, Found};
@@ -119,9 +118,9 @@ impl Spool {
         self.folder.join(format!("{}.{number}.spool", self.robot))
     }
 
-    /// Whether it holds as much as it may.
+    /// Whether it holds as much as it may; an empty one takes a message in any case.
     pub fn is_full(&self) -> bool {
-        self.parts.iter().map(|part| part.bytes).sum::<u64>() >= self.max_bytes
+        !self.parts.is_empty() && self.parts.iter().map(|part| part.bytes).sum::<u64>() >= self.max_bytes
     }
 
     /// Whether messages wait that are not in memory.
@@ -148,14 +147,14 @@ impl Spool {
         }
         let part = self.first + self.parts.len() as u64 - 1;
         let Some(newest) = self.parts.back_mut() else { return Err(ErrorKind::NotFound.into()) };
-        newest.file.write_all_at(&frame, newest.bytes)?;
+        newest.file.seek(SeekFrom::Start(newest.bytes))?;
+        newest.file.write_all(&frame)?;
         if waits {
             self.waiting.push_back(Kept { place, part, at: newest.bytes, bytes: frame.len() });
         }
         newest.bytes += frame.len() as u64;
         newest.last = place;
         if self.synced.elapsed() >= SYNC {
-            newest.file.flush()?;
             newest.file.sync_data()?;
             self.synced = Instant::now();
         }
@@ -171,9 +170,10 @@ impl Spool {
             return Ok(None);
         };
         self.waiting.pop_front();
-        let part = self.parts.get((kept.part - self.first) as usize).ok_or(ErrorKind::NotFound)?;
+        let part = self.parts.get_mut((kept.part - self.first) as usize).ok_or(ErrorKind::NotFound)?;
         let mut bytes = vec![0; kept.bytes];
-        part.file.read_exact_at(&mut bytes, kept.at)?;
+        part.file.seek(SeekFrom::Start(kept.at))?;
+        part.file.read_exact(&mut bytes)?;
         let damaged =
             |why: String| io::Error::new(ErrorKind::InvalidData, format!("{}: {why}", part.path.display()));
         match frame::read(&bytes, 0, SALT) {

@@ -140,6 +140,10 @@ impl Robot {
         *header = Header { robot, boot, seq, clock, stamp: header.stamp };
         message.validate(&Limits::default())?;
         self.drop_acked();
+        while self.spool.as_ref().is_some_and(Spool::is_full) {
+            self.progress().await?;
+            self.refill().await?;
+        }
         if !self.keep(seq, &message)? {
             while self.unacked.len() >= self.config.in_flight_max {
                 self.progress().await?;
@@ -160,9 +164,6 @@ impl Robot {
     fn keep(&mut self, seq: u64, message: &Message) -> Result<bool, ClientError> {
         let Some(spool) = &mut self.spool else { return Ok(false) };
         let waits = spool.waits() || self.unacked.len() >= self.config.in_flight_max;
-        if spool.is_full() && !spool.waits() {
-            return Ok(false);
-        }
         let bincode = message
             .to_bincode()
             .map_err(|e| ClientError::Unreadable { key: "spool".into(), why: e.to_string() })?;

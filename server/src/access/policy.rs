@@ -5,7 +5,6 @@ use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use std::fs;
 use std::io::{ErrorKind, Write as _};
-use std::os::unix::fs::{MetadataExt as _, OpenOptionsExt as _, chown};
 use std::path::{Path, PathBuf};
 use toponym_proto::Invalid;
 use toponym_proto::keys::{ANY_ROBOT, check_id};
@@ -179,7 +178,10 @@ pub fn write_secret(path: &Path, bytes: &[u8]) -> std::io::Result<()> {
         Err(e) if e.kind() != ErrorKind::NotFound => return Err(e),
         _ => {}
     }
-    let mut file = fs::OpenOptions::new().write(true).create_new(true).mode(0o600).open(&new)?;
+    let mut options = fs::OpenOptions::new();
+    #[cfg(unix)]
+    std::os::unix::fs::OpenOptionsExt::mode(&mut options, 0o600);
+    let mut file = options.write(true).create_new(true).open(&new)?;
     file.write_all(bytes)?;
     file.sync_all()?;
     give_to_owner_of(parent(&new), &new)?;
@@ -200,10 +202,17 @@ fn parent(path: &Path) -> &Path {
     path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
+#[cfg(unix)]
 fn give_to_owner_of(folder: &Path, path: &Path) -> std::io::Result<()> {
+    use std::os::unix::fs::{MetadataExt as _, chown};
     let owner = fs::metadata(folder)?;
     // Only root may; for everybody else it is theirs already.
     let _ = chown(path, Some(owner.uid()), Some(owner.gid()));
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn give_to_owner_of(_: &Path, _: &Path) -> std::io::Result<()> {
     Ok(())
 }
 

@@ -1,6 +1,7 @@
 //! A robot whose server is away, and whose own program ends meanwhile: what it kept on disk is sent at its next start.
 
 use crate::drive::{PATIENCE, Server, connected};
+use std::time::Duration;
 use toponym::{Connection, Planner, Robot, RobotConfig};
 use toponym_proto::record::RecordReader;
 use toponym_proto::{Clock, Message};
@@ -8,6 +9,35 @@ use toponym_sim::hall::message;
 
 /// Messages sent before the server ends, and while it is away.
 const SENT: [u64; 2] = [100, 400];
+
+#[tokio::test(flavor = "multi_thread")]
+async fn a_spool_is_bounded_while_the_server_is_away() {
+    let mut server = Server::new();
+    let to = Connection::to(&server.endpoint);
+    let session = connected(&to).await;
+    let config = RobotConfig {
+        clock: Clock::Log,
+        boot: 1,
+        in_flight_max: 20,
+        spool: Some(server.folder.join("spool")),
+        spool_max_bytes: 1 << 16,
+        patience: Duration::from_secs(1),
+        ..RobotConfig::new("r1")
+    };
+    let mut robot = Robot::connect(&session, config).await.unwrap();
+    robot.send(message(0, "main", 61)).await.unwrap();
+    robot.settle().await.unwrap();
+    server.end();
+    let mut n = 1;
+    // What finds no room is not sent: whoever sends is told.
+    while robot.send(message(n, "main", 361)).await.is_ok() {
+        n += 1;
+        assert!(n < 1000, "more is kept than may be");
+    }
+    let files = std::fs::read_dir(server.folder.join("spool")).unwrap();
+    let bytes: u64 = files.map(|file| file.unwrap().metadata().unwrap().len()).sum();
+    assert!((1 << 16..1 << 17).contains(&bytes), "{bytes} bytes");
+}
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_was_spooled_is_sent_at_the_next_start() {

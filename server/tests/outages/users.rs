@@ -28,6 +28,10 @@ async fn users_come_and_go() {
     let before = drive.acked;
     drive.go_for(Duration::from_millis(500)).await;
     assert_eq!(drive.acked, before, "who was revoked is heard still");
+    // Without anybody nobody is let in, from this machine neither.
+    server.user(&["revoke", "anna"]);
+    drive.go_for(Duration::from_secs(3)).await;
+    assert_eq!(drive.acked, before, "an empty policy lets somebody in");
     server.user(&add);
     drive.until_taken("they were let in again").await;
     drive.check(&server).await;
