@@ -8,7 +8,7 @@ use thiserror::Error;
 use tokio::time::{Instant, sleep_until, timeout_at};
 use toponym_proto::Invalid;
 use toponym_proto::answer::{ErrorCode, ErrorReply, Problem};
-use toponym_proto::keys::DEFAULT_ENDPOINT;
+use toponym_proto::keys::{DEFAULT_ENDPOINT, check_link};
 use zenoh::Session;
 use zenoh::query::ConsolidationMode;
 
@@ -86,13 +86,13 @@ fn environment(name: &str) -> Option<String> {
 /// Where to connect, and as whom.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Connection {
-    /// Such as `tcp/127.0.0.1:7457` or, encrypted, `tls/maps.example.org:7457`.
+    /// Such as `tcp/127.0.0.1:7457` or, encrypted, `quic/maps.example.org:7457`.
     pub endpoint: String,
     /// User's name, for a server that knows users by passwords.
     pub user: Option<String>,
     /// User's password.
     pub password: Option<String>,
-    /// Certificate of the authority that signed the server's, for `tls`.
+    /// Certificate of the authority that signed the server's, for `quic`.
     pub ca: Option<PathBuf>,
     /// One's own certificate and key, for a server that knows users by these.
     pub certificate: Option<(PathBuf, PathBuf)>,
@@ -139,6 +139,7 @@ impl Connection {
 
     fn config(&self) -> Result<zenoh::Config, ClientError> {
         let endpoints: Vec<&str> = self.endpoint.split(',').collect();
+        endpoints.iter().try_for_each(|endpoint| check_link("connect", endpoint))?;
         let mut settings: Vec<(&str, Value)> = vec![
             ("mode", json!("client")),
             // A server that was restarted is there again within a second.

@@ -3,7 +3,7 @@
 
 use crate::stream::Message;
 use crate::validate::Invalid;
-pub use crate::validate::{ANY_ROBOT, check_id};
+pub use crate::validate::{ANY_ROBOT, check_id, check_link};
 
 /// TCP port the server listens on by default.
 pub const DEFAULT_PORT: u16 = 7457;

@@ -196,6 +196,15 @@ fn check_text(field: &str, text: &str, limits: &Limits) -> Result<(), Invalid> {
     Ok(())
 }
 
+/// Checks an endpoint's kind of link. `tls/` is refused: Zenoh reads and writes one TLS stream from two threads at once, which
+/// breaks links and can break memory (<https://github.com/eclipse-zenoh/zenoh/issues/2557>).
+pub fn check_link(field: &str, endpoint: &str) -> Result<(), Invalid> {
+    match endpoint.strip_prefix("tls/") {
+        Some(rest) => Err(Invalid::new(field, format!("Zenoh's tls/ breaks under load: use quic/{rest}"))),
+        None => Ok(()),
+    }
+}
+
 /// Checks an id: `[a-z0-9][a-z0-9_-]{0,62}`.
 pub fn check_id(field: &str, id: &str) -> Result<(), Invalid> {
     let word = |c: u8| c.is_ascii_lowercase() || c.is_ascii_digit();

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use toponym_proto::keys::{DEFAULT_ENDPOINT, DEFAULT_SITE, check_id};
+use toponym_proto::keys::{DEFAULT_ENDPOINT, DEFAULT_SITE, check_id, check_link};
 use toponym_proto::{Invalid, Limits};
 
 /// Settings of `toponym-server serve`.
@@ -45,7 +45,7 @@ pub struct AccessConfig {
     /// Users and their roles; by default `policy.toml` in the data folder. As long as it is not there, whoever connects
     /// from this machine may do everything, and nobody else anything.
     pub policy: Option<PathBuf>,
-    /// For endpoints such as `tls/0.0.0.0:7457`.
+    /// For endpoints such as `quic/0.0.0.0:7457`.
     pub tls: Option<TlsConfig>,
 }
 
@@ -137,11 +137,12 @@ impl ServerConfig {
         if self.listen.is_empty() {
             return Err(Invalid::new("listen", "is empty: nobody could connect").into());
         }
-        if let Some(tls) = self.listen.iter().find(|l| l.starts_with("tls/"))
-            && self.access.tls.is_none()
-        {
-            let message = format!("has {tls}, but there is no certificate: see [access.tls]");
-            return Err(Invalid::new("listen", message).into());
+        for endpoint in &self.listen {
+            check_link("listen", endpoint)?;
+            if endpoint.starts_with("quic/") && self.access.tls.is_none() {
+                let message = format!("has {endpoint}, but there is no certificate: see [access.tls]");
+                return Err(Invalid::new("listen", message).into());
+            }
         }
         for (field, value, min) in [
             ("hold_back_s", self.hold_back_s, 0.0),

@@ -73,7 +73,7 @@ async fn ground(folder: &Scratch, policy: &Policy, mutual: bool) -> (Ground, Str
         clients_ca: mutual.then(|| folder.path("tls/ca.pem")),
     };
     let config = ServerConfig {
-        listen: vec!["tls/127.0.0.1:0".into()],
+        listen: vec!["quic/127.0.0.1:0".into()],
         data: folder.0.clone(),
         access: AccessConfig { policy: None, tls: Some(tls) },
         ..ServerConfig::default()
@@ -88,7 +88,10 @@ async fn ground(folder: &Scratch, policy: &Policy, mutual: bool) -> (Ground, Str
 async fn effects(ground: &Ground, connection: &Connection) -> Effects {
     match connection.open().await {
         Ok(client) => ground.effects(&client, Duration::from_secs(10)).await.unwrap(),
-        Err(_) => Effects::new(),
+        Err(error) => {
+            println!("{}: {error}", connection.user.as_deref().unwrap_or("nobody"));
+            Effects::new()
+        }
     }
 }
 

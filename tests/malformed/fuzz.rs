@@ -182,7 +182,7 @@ fn fuzz_selectors() {
 #[test]
 fn fuzz_settings() {
     let whole = toml::to_string(&ServerConfig::default()).unwrap();
-    let some = "site = \"lab\" # comment\nlisten = [\"tls/0.0.0.0:7457\",\n  'tcp/[::1]:1']\nhttp = \"127.0.0.1:7458\"\n\
+    let some = "site = \"lab\" # comment\nlisten = [\"quic/0.0.0.0:7457\",\n  'tcp/[::1]:1']\nhttp = \"127.0.0.1:7458\"\n\
         [access.tls]\ncertificate = \"a.pem\"\nkey = \"k.pem\"\n[mapper]\nrules = \"paper\"\n";
     let mutator = Mutator::of_texts(
         &[&whole, some],

@@ -25,14 +25,14 @@ Examples:
   toponym-server cert new --client anna                                   a user's, who then needs no password
 
 Settings of the server:
-  listen = [\"tls/0.0.0.0:7457\"]
+  listen = [\"quic/0.0.0.0:7457\"]
   [access.tls]
   certificate = \"tls/server.pem\"
   key = \"tls/server-key.pem\"
   clients_ca = \"tls/ca.pem\"        only if clients are to be known by certificates
 
 Clients need ca.pem, to know the server by:
-  toponym --connect tls/maps.example.org:7457 --ca ca.pem [--cert anna.pem --key anna-key.pem] …
+  toponym --connect quic/maps.example.org:7457 --ca ca.pem [--cert anna.pem --key anna-key.pem] …
 
 ca-key.pem stays where it is, and is best kept off the server: whoever has it can make certificates for anybody.")]
 pub struct CertArgs {

@@ -4,9 +4,11 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
+use tokio::time::{Instant, sleep};
 use toponym::Connection;
 use toponym_proto::Keys;
 use toponym_proto::keys::Ask;
+use zenoh::qos::CongestionControl;
 use zenoh::query::{ConsolidationMode, Query, QueryTarget};
 use zenoh::sample::Sample;
 use zenoh::{Session, Wait};
@@ -22,6 +24,8 @@ const OTHER: &str = "other";
 const MAP: &str = "map";
 /// How long what is allowed may take.
 const PATIENCE: Duration = Duration::from_secs(10);
+/// Pause before asking again what nobody answered.
+const AGAIN: Duration = Duration::from_millis(20);
 /// What nobody but the server answers.
 const FORGED: &[u8] = b"forged";
 
@@ -204,7 +208,8 @@ impl Ground {
 
     /// What a client can do; nothing, if it is not even told the time within so long.
     ///
-    /// When that answer is there, all that it sent before was let in or dropped, and all that was sent to it has come.
+    /// It is asked first, and after each part: when that answer is there, all that it sent before was let in or dropped,
+    /// and all that was sent to it has come.
     pub async fn effects(&self, client: &Session, patience: Duration) -> Result<Effects, zenoh::Error> {
         let keys = &self.keys;
         let puts = [
@@ -233,25 +238,29 @@ impl Ground {
                 lock(&came).insert(op);
             }
         };
-        for (_, key) in &puts {
-            client.put(key, "anything").await?;
+        if !self.told_the_time(client, patience).await? {
+            return Ok(Effects::new());
         }
-        for (op, key) in &questions {
-            let note = note(*op);
-            client
-                .get(key)
-                .timeout(patience)
-                .callback(move |reply| {
-                    if reply.result().is_ok() {
-                        note();
-                    }
-                })
-                .await?;
+        for (_, key) in &puts {
+            client.put(key, "anything").congestion_control(CongestionControl::Block).await?;
+        }
+        let mut asked = Vec::new();
+        for (op, key) in questions {
+            asked.push((op, key.clone(), client.get(key).timeout(patience).await?));
         }
         if !self.told_the_time(client, patience).await? {
             return Ok(Effects::new());
         }
         let reached = std::mem::take(&mut *lock(&self.reached));
+        let mut effects: Effects =
+            puts.iter().filter(|(_, key)| reached.contains(key)).map(|(op, _)| (*op, true)).collect();
+        for (op, key, replies) in asked {
+            if reached.contains(&key) {
+                // These may go another way than the time does, and later.
+                let answer = replies.recv_async().await;
+                effects.insert(op, answer.is_ok_and(|reply| reply.result().is_ok()));
+            }
+        }
         // Only now: a session hears itself.
         for (op, key, _) in &watched {
             let note = note(*op);
@@ -264,7 +273,7 @@ impl Ground {
             return Ok(Effects::new());
         }
         for (_, _, key) in &watched {
-            self.session.put(key, "anything").await?;
+            self.session.put(key, "anything").congestion_control(CongestionControl::Block).await?;
         }
         let answers =
             self.session.get(&forged).target(QueryTarget::All).consolidation(ConsolidationMode::None);
@@ -277,19 +286,20 @@ impl Ground {
         if !self.told_the_time(client, patience).await? {
             return Ok(Effects::new());
         }
-        let came = lock(&came);
-        let mut effects: Effects = came.iter().map(|op| (*op, true)).collect();
-        for (op, key) in puts.into_iter().chain(questions) {
-            if reached.contains(&key) {
-                let whole = !matches!(op, Op::Ask | Op::Mend | Op::Command) || came.contains(&op);
-                effects.insert(op, whole);
-            }
-        }
+        effects.extend(lock(&came).iter().map(|op| (*op, true)));
         Ok(effects)
     }
 
+    /// Asks until there is an answer: a session is open before it knows what the router answers.
     async fn told_the_time(&self, client: &Session, patience: Duration) -> Result<bool, zenoh::Error> {
-        let replies = client.get(self.keys.time()).timeout(patience).await?;
-        Ok(replies.recv_async().await.is_ok_and(|reply| reply.result().is_ok()))
+        let deadline = Instant::now() + patience;
+        while Instant::now() < deadline {
+            let replies = client.get(self.keys.time()).timeout(deadline - Instant::now()).await?;
+            match replies.recv_async().await {
+                Ok(reply) => return Ok(reply.result().is_ok()),
+                Err(_) => sleep(AGAIN).await,
+            }
+        }
+        Ok(false)
     }
 }

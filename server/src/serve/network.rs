@@ -54,7 +54,7 @@ pub fn zenoh_config(
     let message_max_bytes = (2 * config.limits.payload_bytes).max(16 << 20);
     let mut settings: Vec<(&str, Value)> = vec![
         ("mode", json!("router")),
-        ("listen/endpoints", json!(config.listen)),
+        ("listen/endpoints", config.listen.iter().map(|endpoint| in_order(endpoint)).collect()),
         ("connect/endpoints", json!([])),
         ("scouting/multicast/enabled", json!(false)),
         ("scouting/gossip/enabled", json!(false)),
@@ -92,6 +92,17 @@ pub fn zenoh_config(
         zenoh.insert_json5(key, &value.to_string()).map_err(NetworkError::Zenoh)?;
     }
     Ok(zenoh)
+}
+
+/// One stream for all priorities over QUIC, as over TCP: what was declared before a question is known when that is answered.
+fn in_order(endpoint: &str) -> String {
+    if !endpoint.starts_with("quic/") || endpoint.contains('?') {
+        return endpoint.into();
+    }
+    match endpoint.split_once('#') {
+        Some((address, settings)) => format!("{address}?multistream=0#{settings}"),
+        None => format!("{endpoint}?multistream=0"),
+    }
 }
 
 /// Replies go as their queries came, and those may ask to be waited for, in the queue of all else. So queries are changed on

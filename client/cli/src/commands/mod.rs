@@ -71,7 +71,7 @@ struct Who {
     /// First line is the user's password.
     #[arg(long, global = true, value_name = "FILE")]
     password_file: Option<PathBuf>,
-    /// Authority that signed the server's certificate, for tls/… [env: TOPONYM_CA].
+    /// Authority that signed the server's certificate, for quic/… [env: TOPONYM_CA].
     #[arg(long, global = true, value_name = "FILE")]
     ca: Option<PathBuf>,
     /// The user's certificate [env: TOPONYM_CERT].
