@@ -3,6 +3,7 @@
 //!
 //! A map has limits of its own: 20 000 sentences and 2000 names (`toponym_core::talk`).
 
+use crate::validate::Invalid;
 use serde::{Deserialize, Serialize};
 
 /// Upper bounds that settings may change; bytes and counts.
@@ -73,19 +74,32 @@ impl Limits {
         commands: 2,
     };
 
-    /// Those of what waits and how many there may be, by name: none of them may be 0.
-    pub fn of_the_server(&self) -> [(&'static str, usize); 9] {
-        [
-            ("queue_messages", self.queue_messages),
-            ("queue_bytes", self.queue_bytes),
-            ("waiting_bytes", self.waiting_bytes),
-            ("backlog_bytes", self.backlog_bytes),
-            ("robots", self.robots),
-            ("maps", self.maps),
-            ("short_queries", self.short_queries),
-            ("long_queries", self.long_queries),
-            ("commands", self.commands),
-        ]
+    /// Checks that none is 0 or beyond what memory and journals can hold.
+    ///
+    /// # Errors
+    /// The first that is, by its name in the settings.
+    pub fn check(&self) -> Result<(), Invalid> {
+        for (field, value, max) in [
+            // A journal can't be read back with longer ones.
+            ("limits.payload_bytes", self.payload_bytes, 4 << 20),
+            ("limits.beams", self.beams, 1 << 20),
+            ("limits.lasers", self.lasers, 1000),
+            ("limits.text_chars", self.text_chars, 4096),
+            ("limits.queue_messages", self.queue_messages, 10_000_000),
+            ("limits.queue_bytes", self.queue_bytes, 1 << 40),
+            ("limits.waiting_bytes", self.waiting_bytes, 1 << 40),
+            ("limits.backlog_bytes", self.backlog_bytes, 1 << 40),
+            ("limits.robots", self.robots, 1_000_000),
+            ("limits.maps", self.maps, 1_000_000),
+            ("limits.short_queries", self.short_queries, 10_000),
+            ("limits.long_queries", self.long_queries, 10_000),
+            ("limits.commands", self.commands, 10_000),
+        ] {
+            if !(1..=max).contains(&value) {
+                return Err(Invalid::new(field, format!("is {value}, must be from 1 to {max}")));
+            }
+        }
+        Ok(())
     }
 }
 

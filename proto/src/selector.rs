@@ -2,7 +2,9 @@
 
 use crate::limits::ARGUMENTS_MAX_BYTES;
 use crate::validate::Invalid;
+use serde::de::{Deserialize, Deserializer, MapAccess, Visitor};
 use std::collections::BTreeMap;
+use std::fmt::Formatter;
 
 /// Arguments by name.
 pub type Arguments = BTreeMap<String, String>;
@@ -55,9 +57,9 @@ pub fn decode(selector: &str, payload: &[u8]) -> Result<Arguments, Invalid> {
     if payload.iter().all(u8::is_ascii_whitespace) {
         return Ok(arguments);
     }
-    let object: serde_json::Map<String, serde_json::Value> = serde_json::from_slice(payload)
+    let Pairs(pairs) = serde_json::from_slice(payload)
         .map_err(|e| Invalid::new("payload", format!("is not a JSON object: {e}")))?;
-    for (name, value) in object {
+    for (name, value) in pairs {
         let text = match value {
             serde_json::Value::String(text) => text,
             serde_json::Value::Number(number) => number.to_string(),
@@ -67,6 +69,30 @@ pub fn decode(selector: &str, payload: &[u8]) -> Result<Arguments, Invalid> {
         add(name, text)?;
     }
     Ok(arguments)
+}
+
+/// A JSON object as it is written: a map would keep the last of two values with one name.
+struct Pairs(Vec<(String, serde_json::Value)>);
+
+impl<'de> Deserialize<'de> for Pairs {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        deserializer.deserialize_map(Self(Vec::new()))
+    }
+}
+
+impl<'de> Visitor<'de> for Pairs {
+    type Value = Self;
+
+    fn expecting(&self, f: &mut Formatter<'_>) -> std::fmt::Result {
+        f.write_str("an object")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(mut self, mut map: A) -> Result<Self, A::Error> {
+        while let Some(pair) = map.next_entry()? {
+            self.0.push(pair);
+        }
+        Ok(self)
+    }
 }
 
 #[cfg(test)]

@@ -49,7 +49,7 @@ fn heads() -> Vec<Case> {
         ("format 3", b"toponym-record 3\n".to_vec(), Came::NotARecord, ""),
         ("another line break", b"toponym-record 2\r\n".to_vec(), Came::NotARecord, ""),
         ("a mark of byte order", [b"\xef\xbb\xbf", MAGIC].concat(), Came::NotARecord, ""),
-        ("a journal", b"toponym-journal 1\n".to_vec(), Came::NotARecord, ""),
+        ("a journal", b"toponym-journal 2\n".to_vec(), Came::NotARecord, ""),
         ("half an origin", framed(&[(0, b"{}")])[..30].to_vec(), Came::NotARecord, ""),
         ("an origin that is no JSON", origin("origin"), Came::Damaged, "byte 17: its origin: expected value"),
         ("an origin of nothing", origin("{}"), Came::Damaged, "byte 17: its origin: missing field `first`"),

@@ -2,6 +2,7 @@
 //! format's own: metres, radians, seconds.
 
 use std::str::FromStr;
+use toponym_proto::limits::STAMP_MAX_NS;
 use toponym_proto::{Pose, Stamp};
 
 /// More beams than any planar laser has: a damaged count must not reserve memory.
@@ -61,7 +62,7 @@ pub fn parse(line: &str) -> Result<Line<'_>, String> {
         Some("FLASER") => flaser(fields),
         Some("ROBOTLASER1") => robotlaser(fields),
         Some("PARAM") => Ok(match (fields.0.next(), fields.0.next().map(f64::from_str)) {
-            (Some(name), Some(Ok(value))) => Line::Param { name, value },
+            (Some(name), Some(Ok(value))) if value.is_finite() => Line::Param { name, value },
             _ => Line::Other("PARAM"),
         }),
         other => Ok(Line::Other(other.unwrap_or(""))),
@@ -119,17 +120,17 @@ fn bearings(beams: usize) -> (f64, f64) {
 /// The exact nanoseconds of a decimal number of seconds; a double would lose some 100 ns of a
 /// stamp of this century.
 pub fn stamp(text: &str) -> Result<Stamp, String> {
-    exact_ns(text).map(|ns| Stamp { ns }).map_or_else(
-        || {
+    let ns = match exact_ns(text) {
+        Some(ns) => Some(ns),
+        None => {
             let s = f64::from_str(text).map_err(|_| format!("stamp {text:?} is not a number"))?;
-            if s.is_finite() && s.abs() < 9e9 {
-                Ok(Stamp::from_seconds(s))
-            } else {
-                Err(format!("stamp {text} is out of range"))
-            }
-        },
-        Ok,
-    )
+            (s.abs() < 9e9).then(|| Stamp::from_seconds(s).ns)
+        }
+    };
+    match ns.filter(|ns| ns.unsigned_abs() <= STAMP_MAX_NS.unsigned_abs()) {
+        Some(ns) => Ok(Stamp { ns }),
+        None => Err(format!("stamp {text} is out of range")),
+    }
 }
 
 fn exact_ns(text: &str) -> Option<i64> {

@@ -91,23 +91,13 @@ impl CarmenLog {
     fn scan(&mut self, scan: ScanLine<'_>) -> Result<(), String> {
         let stamp = carmen::stamp(scan.stamp)?;
         let brings_odom = self.last_odom != Some((scan.odom_from_body, stamp));
-        let beyond = self.range_max_m as f32;
-        let mut ranges_m = scan.ranges_m;
-        ranges_m.iter_mut().filter(|r| **r >= beyond).for_each(|r| *r = f32::INFINITY);
-        let message = Message::Scan(Scan {
-            header: self.header(u64::from(brings_odom), stamp),
-            laser: LASER.into(),
-            angle_min_rad: scan.angle_min_rad,
-            angle_increment_rad: scan.angle_increment_rad,
-            time_increment_s: 0.0,
-            ranges_m,
-        });
+        let (odom_from_body, text) = (scan.odom_from_body, scan.stamp);
         // First of all: of a bad line not even the odometry is taken.
-        check(&message)?;
+        let message = sweep(scan, self.header(u64::from(brings_odom), stamp), self.range_max_m)?;
         if brings_odom {
-            self.odom(scan.odom_from_body, scan.stamp, !self.has_odom)?;
+            self.odom(odom_from_body, text, !self.has_odom)?;
         }
-        self.emit(message, false, scan.stamp.to_owned());
+        self.emit(message, false, text.to_owned());
         Ok(())
     }
 
@@ -128,6 +118,23 @@ impl CarmenLog {
             }
         }
     }
+}
+
+/// A line's sweep, checked.
+fn sweep(scan: ScanLine<'_>, header: Header, range_max_m: f64) -> Result<Message, String> {
+    let beyond = range_max_m as f32;
+    let mut ranges_m = scan.ranges_m;
+    ranges_m.iter_mut().filter(|r| **r >= beyond).for_each(|r| *r = f32::INFINITY);
+    let message = Message::Scan(Scan {
+        header,
+        laser: LASER.into(),
+        angle_min_rad: scan.angle_min_rad,
+        angle_increment_rad: scan.angle_increment_rad,
+        time_increment_s: 0.0,
+        ranges_m,
+    });
+    check(&message)?;
+    Ok(message)
 }
 
 /// What a server would refuse is not read either: a log makes the same map offline and online.
@@ -176,6 +183,7 @@ fn line_at(text: &[u8], at: usize) -> (Result<&str, String>, bool, usize) {
     let end = rest.iter().position(|b| *b == b'\n');
     let line = std::str::from_utf8(&rest[..end.unwrap_or(rest.len())])
         .map_err(|e| format!("not text after {} bytes", e.valid_up_to()));
+    let line = line.map(str::trim_ascii_start);
     match end {
         Some(end) => (line, true, at + end + 1),
         None => (line.map(|l| l.rsplit_once([' ', '\t']).map_or("", |(l, _)| l)), false, text.len()),
@@ -208,10 +216,13 @@ impl Survey {
             } else if is_scan || first_stamp.is_none() || line.starts_with("PARAM") {
                 match carmen::parse(line) {
                     Ok(Line::Odom { stamp, .. }) => first_stamp = first_stamp.or(Some(stamp)),
-                    Ok(Line::Scan(scan)) => {
-                        first_stamp = first_stamp.or(Some(scan.stamp));
-                        first = Some(scan);
-                    }
+                    Ok(Line::Scan(scan)) => match usable(&scan) {
+                        Ok(()) => {
+                            first_stamp = first_stamp.or(Some(scan.stamp));
+                            first = Some(scan);
+                        }
+                        Err(why) => wrong = wrong.or(Some(format!("line {lines}: {why}"))),
+                    },
                     Ok(Line::Param { name: "robot_frontlaser_offset", value }) => offset_m = Some(value),
                     Ok(Line::Param { name: "robot_front_laser_max", value }) => param_max_m = Some(value),
                     Ok(_) => {}
@@ -234,6 +245,14 @@ impl Survey {
             laser: laser(mounting, range_max_m),
         })
     }
+}
+
+/// Whether a scan would be taken.
+fn usable(scan: &ScanLine<'_>) -> Result<(), String> {
+    let Options { robot, boot, .. } = Options::default();
+    let header = Header { robot, boot, seq: 1, stamp: carmen::stamp(scan.stamp)?, clock: Clock::Log };
+    check(&Message::Odom(Odom { header: header.clone(), odom_from_body: scan.odom_from_body }))?;
+    sweep(scan.clone(), header, RANGE_MAX_M).map(drop)
 }
 
 fn laser(body_from_laser: Pose, range_max_m: f64) -> Laser {

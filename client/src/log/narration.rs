@@ -15,7 +15,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 use toponym_proto::merge::{Sentences, order_stamp};
 use toponym_proto::stream::Hearing;
-use toponym_proto::{Message, Say, Stamp};
+use toponym_proto::{Limits, Message, Say, Stamp};
 
 /// Why a narration can't be used. Unlike a log's a bad line is an error: a person wrote it and
 /// can mend it, and the map would silently lack a name.
@@ -90,7 +90,12 @@ impl Narration {
 
     /// Parses the text of a file; the error is the line's number and what is wrong with it.
     pub fn parse(text: &str) -> Result<Self, (usize, String)> {
-        let lines = text.lines().enumerate().filter(|(_, line)| !line.trim().is_empty());
+        // Some editors begin a file with a mark of byte order.
+        let lines = text
+            .trim_start_matches('\u{feff}')
+            .lines()
+            .enumerate()
+            .filter(|(_, line)| !line.trim().is_empty());
         let sentences = lines.map(|(i, line)| sentence(i + 1, line).map_err(|why| (i + 1, why)));
         Ok(Self { sentences: sentences.collect::<Result<_, _>>()? })
     }
@@ -131,9 +136,6 @@ fn sentence(line: usize, text: &str) -> Result<Sentence, String> {
         (Some(_), Some(_)) => return Err("says both t and t_rel".into()),
         _ => return Err("its time is out of range".into()),
     };
-    if fields.text.trim().is_empty() {
-        return Err("text is empty".into());
-    }
     let say = Say {
         id: fields.id.unwrap_or_else(|| line_id(line, text)),
         robot: None,
@@ -146,6 +148,14 @@ fn sentence(line: usize, text: &str) -> Result<Sentence, String> {
         retracts: fields.retracts,
         answers: fields.answers,
     };
+    // What a server would refuse is not read either.
+    let stamp = match began {
+        Began::At(stamp) => stamp,
+        Began::After(ns) => Stamp { ns },
+    };
+    Message::Say(Say { began: Some(stamp), ..say.clone() })
+        .validate(&Limits::default())
+        .map_err(|invalid| invalid.to_string())?;
     Ok(Sentence { began, say })
 }
 

@@ -1,22 +1,24 @@
 //! A segment: a stretch of the journal, in a file that has its full length from the start.
 //!
 //! ```text
-//!    0  toponym-journal 1\n
+//!    0  toponym-journal 2\n
 //!   64  a frame: the map's identity (JSON), index = number of the first entry
-//! 3072  slot 0:  index of the last durable entry u64 │ crc u32
+//! 3072  slot 0:  index of the last durable entry u64 │ crc u32, of these and of the slot's number
 //! 3584  slot 1:  the same, of the commit before or after
 //! 4096  a frame per entry, then zeros
 //! ```
 //! A commit syncs its entries, then writes the slot that is not the newest, and syncs that: what a
 //! slot says is durable, is; and if one is torn or lost, the other one still holds, as long as the entries bear out that
-//! the lost one told of no more than is there.
+//! the lost one told of no more than is there. Format 1 is read; its slots do not say which they are.
 
 use crate::{Disk, DiskFile, Identity, JournalError};
 use std::ops::Range;
 use toponym_proto::frame::{self, Found, u32_at, u64_at};
 
 /// First line.
-const MAGIC: &[u8] = b"toponym-journal 1\n";
+const MAGIC: &[u8] = b"toponym-journal 2\n";
+/// That of the format before.
+const MAGIC_1: &[u8] = b"toponym-journal 1\n";
 /// Where the identity stands.
 const HEAD_AT: usize = 64;
 /// Where the slots stand, each in a sector of its own.
@@ -40,17 +42,18 @@ pub fn first_of(name: &str) -> Option<u64> {
     digits.parse().ok().filter(|first| *first <= INDEX_MAX)
 }
 
-fn slot(salt: u32, durable: u64) -> [u8; 12] {
+fn slot(salt: u32, place: usize, durable: u64) -> [u8; 12] {
     let mut bytes = [0; 12];
     let (index, crc) = bytes.split_at_mut(8);
     index.copy_from_slice(&durable.to_le_bytes());
-    crc.copy_from_slice(&slot_checksum(salt, durable).to_le_bytes());
+    crc.copy_from_slice(&slot_checksum(salt, Some(place), durable).to_le_bytes());
     bytes
 }
 
-fn slot_checksum(salt: u32, durable: u64) -> u32 {
+fn slot_checksum(salt: u32, place: Option<usize>, durable: u64) -> u32 {
     let mut crc = crc32fast::Hasher::new_with_initial(salt);
     crc.update(b"slot");
+    crc.update(place.map(|place| place as u8).as_slice());
     crc.update(&durable.to_le_bytes());
     crc.finalize()
 }
@@ -80,9 +83,9 @@ impl<F: DiskFile> Writer<F> {
         let mut head = MAGIC.to_vec();
         head.resize(HEAD_AT, 0);
         frame::append(&mut head, salt, first, &json);
-        for at in SLOTS_AT {
+        for (place, at) in SLOTS_AT.into_iter().enumerate() {
             head.resize(at, 0);
-            head.extend(slot(salt, first.saturating_sub(1)));
+            head.extend(slot(salt, place, first.saturating_sub(1)));
         }
         let make = || {
             let mut file = disk.create(NEW, size as u64)?;
@@ -107,7 +110,7 @@ impl<F: DiskFile> Writer<F> {
         self.file.sync()?;
         let other = 1 - self.newest_slot;
         let at = SLOTS_AT.get(other).copied().unwrap_or_default();
-        self.file.write_at(at as u64, &slot(self.salt, durable))?;
+        self.file.write_at(at as u64, &slot(self.salt, other, durable))?;
         self.file.sync()?;
         self.at += frames.len();
         self.newest_slot = other;
@@ -143,11 +146,17 @@ pub struct Segment {
 pub fn read(name: &str, bytes: &[u8]) -> Result<Segment, JournalError> {
     let damaged = |offset, why: &str| JournalError::damaged(name, offset, why);
     let first = first_of(name).ok_or_else(|| damaged(0, "its name is no segment's"))?;
-    check_magic(name, bytes, MAGIC)?;
+    let is_old = bytes.starts_with(MAGIC_1);
+    if !is_old {
+        check_magic(name, bytes, MAGIC)?;
+    }
     let (identity, salt) = identity(name, bytes, HEAD_AT, first)?;
-    let slots = SLOTS_AT.map(|at| {
+    let slots = [0, 1].map(|place| {
+        let at = SLOTS_AT[place];
         let (durable, crc) = (u64_at(bytes, at)?, u32_at(bytes, at + 8)?);
-        (slot_checksum(salt, durable) == crc && durable <= INDEX_MAX && durable + 1 >= first)
+        (slot_checksum(salt, (!is_old).then_some(place), durable) == crc
+            && durable <= INDEX_MAX
+            && durable + 1 >= first)
             .then_some(durable)
     });
     let Some(durable) = slots.iter().flatten().max().copied() else {

@@ -309,3 +309,36 @@ fn files_of_another_map_are_not_taken() {
     let error = Journal::open(SimDisk::with(files)).err().unwrap().to_string();
     assert!(error.contains("another map"), "{error}");
 }
+
+/// Five entries as they were written before slots told their place.
+#[test]
+fn a_journal_of_the_format_before_is_read_and_goes_on_in_this_one() {
+    let mut segment = include_bytes!("format-1/00000000000000000001.journal").to_vec();
+    segment.resize(4796, 0);
+    let checkpoint = include_bytes!("format-1/00000000000000000000.checkpoint").to_vec();
+    let files = BTreeMap::from([
+        ("00000000000000000001.journal".to_owned(), segment),
+        ("00000000000000000000.checkpoint".to_owned(), checkpoint),
+    ]);
+    let disk = SimDisk::with(files);
+    let mut journal = Journal::open(disk.clone()).unwrap().journal;
+    journal.append(&bytes(6));
+    assert_eq!(journal.commit().unwrap(), 6);
+    assert_eq!(recovered(&disk).unwrap(), (vec![1, 2, 3, 4, 5, 6], Vec::new()));
+    assert!(disk.files()["00000000000000000006.journal"].starts_with(b"toponym-journal 2\n"));
+}
+
+#[test]
+fn a_slot_in_the_other_ones_place_is_not_believed() {
+    let mut files = whole(5);
+    let segment = files.get_mut("00000000000000000001.journal").unwrap();
+    let slots = [segment[3072..3084].to_vec(), segment[3584..3596].to_vec()];
+    for (at, slot) in [(3072, &slots[1]), (3584, &slots[0])] {
+        let mut files = files.clone();
+        files.get_mut("00000000000000000001.journal").unwrap()[at..at + 12].copy_from_slice(slot);
+        // One slot is lost: as long as all entries are there nothing else is.
+        if let Ok((all, _)) = recovered(&SimDisk::with(files)) {
+            assert_eq!(all, [1, 2, 3, 4, 5]);
+        }
+    }
+}

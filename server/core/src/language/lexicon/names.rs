@@ -12,6 +12,8 @@ use std::fmt;
 
 /// A name of at most this many words is taken in.
 pub(crate) const MAX_NAME_WORDS: usize = 8;
+/// And of at most this many characters: it stands on maps, and in every answer.
+const MAX_NAME_CHARS: usize = 100;
 
 /// A place name in its canonical spelling, the one used as a label: lower case, words joined by
 /// single spaces, no determiner, singular head, synonyms unified ("the restrooms" is `bathroom`),
@@ -49,7 +51,8 @@ impl Name {
         canonical.retain(|word| !word.is_empty());
         // Spelling may add words ("2b4", "two b four"): the result must be a name, too.
         let fits = words.len().max(canonical.len()) <= 2 * MAX_NAME_WORDS;
-        (!canonical.is_empty() && fits).then(|| Self(canonical.join(" ")))
+        let name = canonical.join(" ");
+        (!name.is_empty() && fits && name.chars().count() <= MAX_NAME_CHARS).then_some(Self(name))
     }
 
     /// The canonical spelling.

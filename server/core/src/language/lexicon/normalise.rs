@@ -53,7 +53,8 @@ fn split(text: &str) -> Vec<Sentence> {
     while at < chars.len() {
         let c = chars[at];
         let next = chars.get(at + 1).copied();
-        if is_of_word(c) {
+        // A mark begins no word: what it stands on is missing.
+        if c.is_alphanumeric() {
             let end = word_end(&chars, at);
             now.words.push(Word { text: chars[at..end].iter().collect(), capital: upper[at] });
             at = end;

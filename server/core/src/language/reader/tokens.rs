@@ -28,7 +28,7 @@ pub fn tokens(text: &str) -> Vec<Token> {
     while at < chars.len() {
         let c = chars[at];
         let next = chars.get(at + 1).copied().unwrap_or(' ');
-        if is_of_word(c) {
+        if c.is_alphanumeric() {
             let end = word_end(&chars, at);
             let word: String = chars[at..end].iter().collect();
             words.push((word, c.is_uppercase() && mixed));
