@@ -32,8 +32,11 @@ pub struct Limits {
     pub backlog_bytes: usize,
     /// Robots that are kept account of.
     pub robots: usize,
-    /// Maps that are kept.
+    /// Maps that are kept at hand.
     pub maps: usize,
+    /// Seconds without a message after which a map may make room for a new one. It stays on disk: its robot's next setup
+    /// brings it back. One in which there is nothing yet may do so after [`EMPTY_IDLE_S`].
+    pub map_idle_s: u64,
     /// Questions with short answers that are worked on at the same time; more get `busy`.
     pub short_queries: usize,
     /// The same of those with long answers, and of keys with wildcards.
@@ -69,6 +72,7 @@ impl Limits {
         backlog_bytes: 32 << 20,
         robots: 64,
         maps: 16,
+        map_idle_s: 86_400,
         short_queries: 64,
         long_queries: 2,
         commands: 2,
@@ -112,6 +116,8 @@ impl Default for Limits {
 /// Largest boot: any Unix time in milliseconds, and far below 2^53, up to which integers in JSON are exact. One that is
 /// far off would make all later starts of its robot look old.
 pub const BOOT_MAX: u64 = 1 << 46;
+/// See [`Limits::map_idle_s`].
+pub const EMPTY_IDLE_S: u64 = 300;
 /// Largest seq.
 pub const SEQ_MAX: u64 = 1 << 46;
 /// Times stay within this of the clock's zero, so that the difference of two is never too large.

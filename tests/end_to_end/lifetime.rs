@@ -1,11 +1,12 @@
 //! Start, stop, and what outlives them.
 
-use crate::site::{Folder, Site, drive, saved_map, settings, setup};
+use crate::site::{Folder, Site, drive, header, saved_map, settings, setup};
 use toponym_proto::answer::{ErrorCode, GraphReply, Info};
 use toponym_proto::keys::Ask;
 use toponym_proto::{Header, Limits, Message, Setup};
 use toponym_server::config::ServerConfig;
 use toponym_server::serve::{Server, serve};
+use toponym_sim::hall;
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_map_outlives_the_server() {
@@ -42,6 +43,39 @@ async fn a_map_outlives_the_server() {
     acks.ack_of(81).await;
     site.stop().await;
     assert!(saved_map(&folder, "main") == saved_map(&whole, "main"));
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn an_idle_map_makes_room_and_is_brought_back() {
+    let folder = Folder::new();
+    let mut config = settings(&folder);
+    (config.limits.maps, config.limits.map_idle_s) = (1, 0);
+    let site = Site::start(config).await;
+    let graphs = site.listen(site.keys.graph("one")).await;
+    let acks = site.acks("r1").await;
+    for message in drive("r1", "one").iter().take(81) {
+        site.send(message).await;
+    }
+    acks.ack_of(80).await;
+    site.settle().await;
+    graphs.until(|graph: &GraphReply| graph.places.len() > 3).await;
+    let info: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
+    let (acks, states) = (site.acks("r2").await, site.states("r1").await);
+    for message in drive("r2", "two").iter().take(41) {
+        site.send(message).await;
+    }
+    acks.ack_of(40).await;
+    let gone = site.ask(&site.keys.ask("one", Ask::Labels), "").await.unwrap_err();
+    assert!(gone.code == ErrorCode::NoSuchMap && gone.message.contains("made room"), "{gone:?}");
+
+    // It says its setup again, and goes on where it was.
+    states.state(|state| state.map.is_none()).await;
+    site.send(&hall::setup(header("r1", 81), "one")).await;
+    states.state(|state| state.map.as_deref() == Some("one")).await;
+    let back: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
+    assert_eq!((&back.maps[0].uuid, back.maps.len()), (&info.maps[0].uuid, 1));
+    site.stop().await;
+    assert!(!toponym_core::Mapper::load(&saved_map(&folder, "one")).unwrap().snapshot().is_empty());
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -120,13 +120,11 @@ fn bearings(beams: usize) -> (f64, f64) {
 /// The exact nanoseconds of a decimal number of seconds; a double would lose some 100 ns of a
 /// stamp of this century.
 pub fn stamp(text: &str) -> Result<Stamp, String> {
-    let ns = match exact_ns(text) {
-        Some(ns) => Some(ns),
-        None => {
-            let s = f64::from_str(text).map_err(|_| format!("stamp {text:?} is not a number"))?;
-            (s.abs() < 9e9).then(|| Stamp::from_seconds(s).ns)
-        }
-    };
+    let mut ns = exact_ns(text);
+    if ns.is_none() {
+        let s = f64::from_str(text).map_err(|_| format!("stamp {text:?} is not a number"))?;
+        ns = (s.abs() < 9e9).then(|| Stamp::from_seconds(s).ns);
+    }
     match ns.filter(|ns| ns.unsigned_abs() <= STAMP_MAX_NS.unsigned_abs()) {
         Some(ns) => Ok(Stamp { ns }),
         None => Err(format!("stamp {text} is out of range")),

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, AtomicUsize, Ordering};
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use toponym_core::Snapshot;
 use toponym_proto::answer::{MapIdentity, Problem, RobotState};
 use toponym_proto::{Keys, Stamp};
@@ -53,6 +53,8 @@ pub struct MapView {
     pub trouble: Mutex<Option<String>>,
     /// Whether its filter has ended: nothing more becomes durable.
     pub ended: AtomicBool,
+    /// When its robot last brought it something.
+    pub heard_at: Mutex<Instant>,
     /// By when the filter is to stop, once the server does.
     pub stops_at: Mutex<Option<Instant>>,
     /// Way to the map's journal, and from there to its filter.
@@ -90,9 +92,15 @@ impl MapView {
             unused: Mutex::default(),
             trouble: Mutex::default(),
             ended: AtomicBool::new(false),
+            heard_at: Mutex::new(Instant::now()),
             stops_at: Mutex::default(),
             work,
         }
+    }
+
+    /// How long nothing has come for it.
+    pub fn idle(&self) -> Duration {
+        lock(&self.heard_at).elapsed()
     }
 
     /// Whether the server stops.
@@ -119,7 +127,7 @@ pub struct Board {
     pub site: String,
     /// The maps.
     pub maps: ArcSwap<BTreeMap<String, Arc<MapView>>>,
-    /// Maps that could not be loaded, and why.
+    /// Maps that could not be loaded, or made room for others, and why.
     pub broken: Mutex<BTreeMap<String, Problem>>,
     /// The robots that were heard.
     pub robots: Mutex<BTreeMap<String, RobotState>>,

@@ -170,10 +170,13 @@ impl Intake {
 
     fn delete(&mut self, map: &str) -> Result<(), Problem> {
         self.maps.delete(map)?;
-        for robot in self.robots.values_mut() {
-            robot.lose_map(map);
-        }
+        let problem = Problem::new(ErrorCode::NoSuchMap, format!("map {map:?} was deleted"));
+        self.lose(map, &problem.field("map").hint("send a setup again: it makes a new map"));
         Ok(())
+    }
+
+    fn lose(&mut self, map: &str, why: &Problem) {
+        self.robots.values_mut().for_each(|robot| robot.lose_map(map, why));
     }
 
     fn read(&self, key: &str, encoding: &str, bytes: &[u8]) -> Result<Message, Refused> {
@@ -308,6 +311,9 @@ impl Intake {
         let maps = &mut self.maps;
         for robot in self.robots.values_mut() {
             robot.advance(now, finish, &mut |setup| maps.find(setup));
+        }
+        for (map, why) in self.maps.take_retired() {
+            self.lose(&map, &why);
         }
         self.report(finish);
     }

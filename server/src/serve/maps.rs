@@ -1,7 +1,7 @@
 //! The maps there are: loads them at the start, makes new ones for robots, starts and stops their
 //! threads.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::thread::JoinHandle;
@@ -9,6 +9,7 @@ use std::time::{Duration, Instant};
 use toponym_core::Mapper;
 use toponym_journal::{Entry, Event, Folder, Journal};
 use toponym_proto::answer::{ErrorCode, Problem};
+use toponym_proto::limits::EMPTY_IDLE_S;
 use toponym_proto::{Setup, Stamp};
 use tracing::{error, info, warn};
 
@@ -32,8 +33,8 @@ const STOP_WAIT: Duration = Duration::from_secs(3);
 /// What is known of a robot of an earlier run.
 #[derive(Clone)]
 pub struct Saved {
-    /// The map it was on last.
-    pub map: Arc<MapView>,
+    /// The map it was on last, if that is at hand.
+    pub map: Option<Arc<MapView>>,
     /// (boot, seq) of the last of its messages that is on disk, or given up.
     pub watermark: (u64, u64),
     /// Newest stamp of those.
@@ -51,6 +52,10 @@ pub struct Maps {
     threads: Vec<(String, JoinHandle<Result<(), String>>)>,
     /// The saved map of each robot that it was on last.
     saved: BTreeMap<String, Saved>,
+    /// Those on disk alone: there was no room.
+    retired: BTreeSet<String>,
+    /// Those of them that their robots do not know of yet.
+    newly_retired: Vec<(String, Problem)>,
 }
 
 /// A map to be started.
@@ -69,12 +74,19 @@ impl Maps {
         store: Arc<Store>,
         records: Option<Recordings>,
     ) -> Self {
-        Self { config, board, outbox, store, records, threads: Vec::new(), saved: BTreeMap::new() }
+        let (threads, saved) = (Vec::new(), BTreeMap::new());
+        let (retired, newly_retired) = (BTreeSet::new(), Vec::new());
+        Self { config, board, outbox, store, records, threads, saved, retired, newly_retired }
     }
 
     /// Starts a thread for each saved map. One that can't be loaded stops only itself.
     pub fn start_saved(&mut self) -> Result<(), StoreError> {
-        for id in self.store.ids()? {
+        for (started, id) in self.store.ids()?.into_iter().enumerate() {
+            if started >= self.config.limits.maps {
+                warn!(map = id, "not loaded: there are {started} maps at hand, limits.maps");
+                self.show_retired(&id);
+                continue;
+            }
             let loaded = self.store.load(&id, self.hold()).map_err(|e| e.to_string());
             if let Err(why) = loaded.and_then(|found| self.go_on(&id, found)) {
                 error!(map = id, "this map is not served: {why}");
@@ -113,9 +125,9 @@ impl Maps {
         let robot = fold.card.robot.clone();
         let view = self.start(id, Start { fold, tail, journal }, watermark).map_err(|e| e.to_string())?;
         if let Some(watermark) = watermark
-            && self.saved.get(&robot).is_none_or(|known| known.watermark < watermark)
+            && self.saved.get(&robot).is_none_or(|known| known.watermark <= watermark)
         {
-            self.saved.insert(robot, Saved { map: view, watermark, newest });
+            self.saved.insert(robot, Saved { map: Some(view), watermark, newest });
         }
         Ok(())
     }
@@ -133,25 +145,16 @@ impl Maps {
     /// The map that a robot's setup names, new if there is none. A map has one robot.
     pub fn find(&mut self, setup: &Setup) -> Result<Arc<MapView>, Problem> {
         let (id, robot) = (&setup.map, &setup.header.robot);
-        if let Some(problem) = lock(&self.board.broken).get(id) {
+        let is_retired = self.retired.contains(id);
+        if let Some(problem) = lock(&self.board.broken).get(id).filter(|_| !is_retired) {
             return Err(problem.clone());
         }
-        let maps = self.board.maps.load();
-        if let Some(view) = maps.get(id) {
-            if view.robot == *robot {
-                return Ok(view.clone());
-            }
-            let message = format!("map {id:?} is mapped by robot {:?}", view.robot);
-            return Err(Problem::new(ErrorCode::MapTaken, message)
-                .field("map")
-                .hint("one robot maps a map: give this one another map in its setup"));
+        if let Some(view) = self.board.maps.load().get(id) {
+            return if view.robot == *robot { Ok(view.clone()) } else { Err(taken(id, &view.robot)) };
         }
-        if maps.len() >= self.config.limits.maps {
-            self.board.reach("maps");
-            let message = format!("there are {} maps already", maps.len());
-            return Err(Problem::new(ErrorCode::TooLarge, message)
-                .field("map")
-                .hint("raise limits.maps in the server's configuration"));
+        self.make_room()?;
+        if is_retired {
+            return self.bring_back(id, robot);
         }
         let card = Card { uuid: new_uuid(), robot: robot.clone(), watermark: None, stamp_ns: 0 };
         let fold = Fold::new(Mapper::new(self.config.mapper.clone()), card, self.hold());
@@ -160,6 +163,70 @@ impl Maps {
         });
         started
             .map_err(|e| Problem::new(ErrorCode::Internal, format!("map {id:?} could not be started: {e}")))
+    }
+
+    /// Leaves room for one more map: if need be, that for which nothing has come for longest makes it.
+    fn make_room(&mut self) -> Result<(), Problem> {
+        let maps = self.board.maps.load_full();
+        if maps.len() < self.config.limits.maps {
+            return Ok(());
+        }
+        let spare = |view: &&Arc<MapView>| {
+            let (idle_s, most_s) = (view.idle().as_secs(), self.config.limits.map_idle_s);
+            idle_s >= most_s || (idle_s >= EMPTY_IDLE_S && view.snapshot.load().is_empty())
+        };
+        let Some(view) = maps.values().filter(spare).max_by_key(|view| view.idle()).cloned() else {
+            self.board.reach("maps");
+            let message = format!("there are {} maps already", maps.len());
+            return Err(Problem::new(ErrorCode::TooLarge, message)
+                .field("map")
+                .hint("raise limits.maps in the server's configuration, or delete a map"));
+        };
+        self.retire(&view);
+        Ok(())
+    }
+
+    /// Keeps a map on disk alone.
+    fn retire(&mut self, view: &MapView) {
+        info!(map = view.id, idle_s = view.idle().as_secs(), "retired: another needs its room");
+        self.end(view, STOP_WAIT);
+        if let Some(watermark) = *lock(&view.durable)
+            && self.saved.get(&view.robot).is_none_or(|known| known.watermark <= watermark)
+        {
+            let saved = Saved { map: None, watermark, newest: view.stamp() };
+            self.saved.insert(view.robot.clone(), saved);
+        }
+        let problem = self.show_retired(&view.id);
+        self.newly_retired.push((view.id.clone(), problem));
+    }
+
+    /// Tells whoever asks for a map that it is on disk alone.
+    fn show_retired(&mut self, id: &str) -> Problem {
+        let problem = Problem::new(ErrorCode::NoSuchMap, format!("map {id:?} made room for others"))
+            .field("map")
+            .hint("it is on disk: a setup of its robot brings it back; or raise limits.maps");
+        self.retired.insert(id.into());
+        lock(&self.board.broken).insert(id.into(), problem.clone());
+        problem
+    }
+
+    /// Loads a map that is on disk alone.
+    fn bring_back(&mut self, id: &str, robot: &str) -> Result<Arc<MapView>, Problem> {
+        let failed =
+            |why: String| Problem::new(ErrorCode::Internal, format!("map {id:?} can't be loaded: {why}"));
+        let found = self.store.load(id, self.hold()).map_err(|e| failed(e.to_string()))?;
+        if found.fold.card.robot != robot {
+            return Err(taken(id, &found.fold.card.robot));
+        }
+        self.retired.remove(id);
+        lock(&self.board.broken).remove(id);
+        self.go_on(id, found).map_err(failed)?;
+        self.board.maps.load().get(id).cloned().ok_or_else(|| failed("it has ended".into()))
+    }
+
+    /// Maps that made room since this was last asked, and what their robots are told.
+    pub fn take_retired(&mut self) -> Vec<(String, Problem)> {
+        std::mem::take(&mut self.newly_retired)
     }
 
     /// `durable`: (boot, seq) of the last of its robot's messages in its journal; the filter may not be that far.
@@ -230,15 +297,21 @@ impl Maps {
             return Err(Problem::new(ErrorCode::NoSuchMap, message).field("map"));
         }
         if let Some(view) = view {
-            *lock(&view.stops_at) = Some(Instant::now());
-            let _ = view.work.send(Work::Stop);
-            self.saved.retain(|_, saved| saved.map.id != id);
-            self.board.remove_map(id);
+            self.end(&view, Duration::ZERO);
+            self.saved.retain(|_, saved| saved.map.as_ref().is_none_or(|map| map.id != id));
         }
-        self.join(|of| of == id);
+        self.retired.remove(id);
         let kept = self.store.set_aside(id).map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))?;
         info!(map = id, kept = %kept.display(), "deleted; what it was is kept");
         Ok(())
+    }
+
+    /// Ends a map's threads; its filter may go on for a while.
+    fn end(&mut self, view: &MapView, wait: Duration) {
+        *lock(&view.stops_at) = Some(Instant::now() + wait);
+        let _ = view.work.send(Work::Stop);
+        self.board.remove_map(&view.id);
+        self.join(|of| of == view.id);
     }
 
     /// Waits for the threads of some maps; tells what became of those that could not be saved.
@@ -258,6 +331,12 @@ impl Maps {
         }
         failed
     }
+}
+
+fn taken(map: &str, robot: &str) -> Problem {
+    Problem::new(ErrorCode::MapTaken, format!("map {map:?} is mapped by robot {robot:?}"))
+        .field("map")
+        .hint("one robot maps a map: give this one another map in its setup")
 }
 
 /// 128 random bits in the usual notation.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::TrySendError;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 use toponym_journal::Event;
 use toponym_proto::answer::{ANSWER_VERSION, Ack, Counts, ErrorCode, Problem, RobotState};
 use toponym_proto::sequence::{Patience, Sequencer, Step};
@@ -69,7 +69,7 @@ impl Robot {
             heard_at: Duration::ZERO,
             first: None,
             newest: saved.as_ref().map(|saved| saved.newest),
-            map: saved.map(|saved| saved.map),
+            map: saved.and_then(|saved| saved.map),
             boot: watermark.map(|w| w.0),
             handed: watermark,
             acked: watermark,
@@ -273,13 +273,10 @@ impl Robot {
         self.parked.is_none() && self.is_drained()
     }
 
-    /// Its map was deleted, if it was this one: it has to present itself again.
-    pub fn lose_map(&mut self, id: &str) {
+    /// Its map is gone, if it was this one: it has to present itself again.
+    pub fn lose_map(&mut self, id: &str, why: &Problem) {
         if self.map.as_ref().is_some_and(|map| map.id == id) {
-            let message = format!("map {id:?} was deleted");
-            let hint = "send a setup again: it makes a new map";
-            self.no_map = Some(Problem::new(ErrorCode::NoSuchMap, message).field("map").hint(hint));
-            self.map = None;
+            (self.map, self.no_map) = (None, Some(why.clone()));
         }
     }
 
@@ -334,6 +331,7 @@ fn hand(map: &MapView, event: Event, backlog_max_bytes: usize) -> Result<(), Try
         return Err(TrySendError::Full(event));
     }
     map.backlog_bytes.fetch_add(bytes, Ordering::Relaxed);
+    *lock(&map.heard_at) = Instant::now();
     let given_back = |work: Work| {
         map.backlog_bytes.fetch_sub(bytes, Ordering::Relaxed);
         match work {

@@ -82,6 +82,11 @@ impl Snapshot {
         self.now.rev
     }
 
+    /// Whether there is no place yet.
+    pub fn is_empty(&self) -> bool {
+        self.places.is_empty() && self.open.is_empty()
+    }
+
     /// Newest pose of the robot in the map.
     pub fn robot(&self) -> Option<Pose2> {
         self.now.robot
