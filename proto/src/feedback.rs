@@ -144,6 +144,9 @@ pub struct RobotState {
     /// Why the newest of the acknowledged messages that could not be used was not.
     #[serde(default)]
     pub unused: Option<String>,
+    /// What seems wrong with the robot's senses, each kind once, in words.
+    #[serde(default)]
+    pub senses: Vec<String>,
 }
 
 /// Messages of a robot since the server started.

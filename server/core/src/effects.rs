@@ -23,6 +23,22 @@ pub enum TrackState {
     Lost,
 }
 
+/// What may be wrong with a robot's senses.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Suspicion {
+    /// A laser's stamps are of another clock than odometry's.
+    Clocks,
+    /// A laser repeats one scan while the robot moves.
+    Frozen,
+    /// A laser has seen nothing within its range for some metres.
+    Blind,
+    /// Odometry stands still while scans move.
+    Still,
+    /// Scans and wheels contradict each other in the long run.
+    Contradiction,
+}
+
 /// What became of a sentence.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -160,6 +176,15 @@ pub enum Effect {
         epoch: u64,
         /// New map frame from old, through the robot's current pose.
         new_from_old: Pose2,
+    },
+    /// Something is wrong with the robot's senses, or they contradict each other. Told once of each kind.
+    Suspected {
+        /// Stamp of the scan with which it showed.
+        stamp_ns: StampNs,
+        /// Of which kind.
+        what: Suspicion,
+        /// In words.
+        why: String,
     },
     /// The robot's odometry jumped or restarted: a new segment began.
     SegmentBegan {

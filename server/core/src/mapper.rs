@@ -70,7 +70,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 10 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 11 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -177,13 +177,13 @@ impl Mapper {
 
     /// Places the scans that odometry brackets, or whose time is up. None: all of them.
     fn place_waiting(&mut self, now_ns: Option<StampNs>, effects: &mut Effects) {
-        while let Some(scan) = self.track.next_due(now_ns) {
-            if let Some(placed) = self.track.place(&scan, effects) {
+        while let Some(waiting) = self.track.next_due(now_ns) {
+            if let Some(placed) = self.track.place(&waiting, effects) {
                 self.rev += u64::from(placed.began);
                 self.corrected(placed.new_from_old, effects);
                 self.grow(placed.frozen, effects);
                 self.stand(effects);
-                effects.push(self.tracked(scan.stamp_ns, placed.odom_from_body));
+                effects.push(self.tracked(waiting.scan.stamp_ns, placed.odom_from_body));
             }
         }
     }

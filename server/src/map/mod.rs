@@ -48,6 +48,7 @@ pub fn run(args: &MapArgs) -> Result<()> {
         .context("--threads: the threads could not be started; give a smaller number")?;
     let finished = pool.install(|| play(log, mapper, args))?;
     finished.notes.warnings().iter().for_each(|w| eprintln!("warning: {w}"));
+    finished.played.suspicions.iter().for_each(|(_, _, why)| eprintln!("warning: {why}"));
     finished.write(args)
 }
 

@@ -8,7 +8,7 @@ use std::time::Instant;
 use toponym::log::LogRecord;
 use toponym_core::answers::query::GraphAnswer;
 use toponym_core::answers::trajectory::{Keyframe, carry};
-use toponym_core::effects::{Heard, TrackState};
+use toponym_core::effects::{Heard, Suspicion, TrackState};
 use toponym_core::{Effect, Effects, Event, Mapper, Pose2};
 use toponym_proto::{Message, Refused};
 
@@ -32,6 +32,8 @@ pub struct Played {
     pub scans_dropped: BTreeMap<String, u64>,
     /// Why odometry segments began, and when.
     pub segments: Vec<(i64, String)>,
+    /// What seemed wrong with the robot's senses, and when that showed.
+    pub suspicions: Vec<(i64, Suspicion, String)>,
     /// How well the robot knew where it was, from when on and why: each change.
     pub states: Vec<(i64, TrackState, String)>,
     /// Where the history goes, if it is asked for.
@@ -56,6 +58,7 @@ impl Played {
             scans_placed: 0,
             scans_dropped: BTreeMap::new(),
             segments: Vec::new(),
+            suspicions: Vec::new(),
             states: Vec::new(),
             history: None,
             stopwatch: Stopwatch::default(),
@@ -122,6 +125,9 @@ impl Played {
                 *self.scans_dropped.entry(reason).or_default() += 1;
             }
             Effect::SegmentBegan { stamp_ns, reason } => self.segments.push((stamp_ns, reason)),
+            Effect::Suspected { stamp_ns, what, why } => {
+                self.suspicions.push((stamp_ns, what, why));
+            }
             Effect::StateChanged { stamp_ns, state, why } => self.states.push((stamp_ns, state, why)),
             Effect::Heard(heard) => self.heard.push(heard),
             _ => {}

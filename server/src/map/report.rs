@@ -10,7 +10,7 @@ use toponym::log::Notes;
 use toponym_core::Config;
 use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
 use toponym_core::edge::{EdgeKind, PlaceId};
-use toponym_core::effects::{Heard, HeardStatus, TrackState};
+use toponym_core::effects::{Heard, HeardStatus, Suspicion, TrackState};
 use toponym_proto::answer::{Candidate, Difference, MapIdentity};
 use toponym_proto::stream::Stamp;
 
@@ -25,6 +25,8 @@ pub struct Report {
     pub unresolved: f64,
     /// What the best graphs disagree about.
     pub differences: Vec<Difference>,
+    /// What seemed wrong with the robot's senses: an entry of each kind.
+    pub health: Vec<Suspected>,
     /// How well the robot knew where it was: an entry at each change.
     pub states: Vec<Standing>,
     /// Answers to the questions asked.
@@ -153,6 +155,17 @@ pub struct Segment {
     pub reason: String,
 }
 
+/// Something seemed wrong with the robot's senses.
+#[derive(Debug, Serialize)]
+pub struct Suspected {
+    /// When it showed.
+    pub stamp_s: f64,
+    /// `clocks`, `frozen`, `blind`, `still` or `contradiction`.
+    pub what: Suspicion,
+    /// In words.
+    pub why: String,
+}
+
 /// How well the robot knew where it was.
 #[derive(Debug, Serialize)]
 pub struct Standing {
@@ -184,6 +197,7 @@ pub fn report(
         particles: graph.particles.iter().map(particle).collect(),
         unresolved: graph.unresolved,
         differences: graph.differences.iter().cloned().map(convert::difference).collect(),
+        health: played.suspicions.iter().map(suspected).collect(),
         states: played.states.iter().map(state).collect(),
         answers: answers.into_iter().map(|a| answer(a, robot)).collect(),
         utterances: played.heard.iter().map(utterance).collect(),
@@ -244,6 +258,10 @@ fn answer(a: WhereAnswer, robot: &str) -> Answer {
         unresolved: reply.unresolved,
         candidates: reply.candidates,
     }
+}
+
+fn suspected((stamp_ns, what, why): &(i64, Suspicion, String)) -> Suspected {
+    Suspected { stamp_s: seconds(*stamp_ns), what: *what, why: why.clone() }
 }
 
 fn state((ns, state, why): &(i64, TrackState, String)) -> Standing {

@@ -33,6 +33,9 @@ pub fn text(args: &MapArgs, done: &Finished) -> String {
     if let Some(ways) = sentence(&done.graph.differences) {
         line("open", ways);
     }
+    for (_, _, why) in &played.suspicions {
+        line("senses", why.clone());
+    }
     if let Some(state) = state(&played.states) {
         line("robot", state);
     }

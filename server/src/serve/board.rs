@@ -49,6 +49,8 @@ pub struct MapView {
     pub held: AtomicUsize,
     /// Scans that were of no use, and why the newest was not.
     pub unused: Mutex<(u64, Option<String>)>,
+    /// What seems wrong with its robot's senses.
+    pub suspected: Mutex<Vec<String>>,
     /// Why the journal can't be written, as long as it can't.
     pub trouble: Mutex<Option<String>>,
     /// Whether its filter has ended: nothing more becomes durable.
@@ -90,6 +92,7 @@ impl MapView {
             sync_ns: AtomicU64::new(0),
             held: AtomicUsize::new(0),
             unused: Mutex::default(),
+            suspected: Mutex::default(),
             trouble: Mutex::default(),
             ended: AtomicBool::new(false),
             heard_at: Mutex::new(Instant::now()),

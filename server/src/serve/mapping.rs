@@ -278,6 +278,10 @@ impl Mapping {
             // Walking round a block brings hundreds of these; what words bring is rare.
             Effect::EdgeAccepted { kind: EdgeKind::Distance, reason, .. } => debug!(map, "{reason}"),
             Effect::EdgeAccepted { weight, reason, .. } => info!(map, weight, "{reason}"),
+            Effect::Suspected { stamp_ns, why, .. } => {
+                warn!(map, stamp_ns, "{why}");
+                lock(&self.view.suspected).push(why);
+            }
             Effect::SegmentBegan { stamp_ns, reason } => warn!(map, stamp_ns, "new segment: {reason}"),
             Effect::EdgeRefused { reason, .. } => debug!(map, "{reason}"),
             Effect::Mended(done) => info!(map, "mended: {done:?}"),

@@ -310,6 +310,7 @@ impl Robot {
             boot: self.boot,
             newest: self.newest,
             unused: unused.1,
+            senses: self.map.as_ref().map(|map| lock(&map.suspected).clone()).unwrap_or_default(),
             counts: Counts {
                 repeated: dropped.repeated,
                 stale: dropped.stale,

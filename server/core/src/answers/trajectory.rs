@@ -17,8 +17,11 @@ pub struct Keyframe {
     pub odom_from_body: Pose2,
 }
 
+/// Paths of which one is half the other's, and that differ by more, metres plus radians, are not the same way.
+const UNLIKE: f64 = 0.02;
+
 /// Poses of odometry `rows` (in order of arrival) in the map: odometry since the keyframe before
-/// and back from the keyframe after, blended by path. Keyframes are in order of arrival; those
+/// and back from the keyframe after, blended by odometry's path, or if that is not the way that was gone by rows. Keyframes are in order of arrival; those
 /// whose place is not in `places` are passed over. Before the first keyframe and after the last,
 /// the one that there is; with no keyframe at all, odometry itself.
 pub fn carry(rows: &[Pose2], keyframes: &[Keyframe], places: &BTreeMap<PlaceId, Pose2>) -> Vec<Pose2> {
@@ -45,7 +48,13 @@ pub fn carry(rows: &[Pose2], keyframes: &[Keyframe], places: &BTreeMap<PlaceId, 
                 (Some(a), Some(b)) => {
                     let at = |r: usize| path_m[r.saturating_sub(1)];
                     let span = at(b.0) - at(a.0);
-                    let f = if span > 1e-9 { ((path_m[i] - at(a.0)) / span).clamp(0.0, 1.0) } else { 0.0 };
+                    let moved = a.1.distance_m(&b.1) + wrap_abs(&a.1, &b.1);
+                    let (done, all) = if (span - moved).abs() > UNLIKE.max(0.5 * span.max(moved)) {
+                        ((i + 1).saturating_sub(a.0) as f64, (b.0 - a.0) as f64)
+                    } else {
+                        (path_m[i] - at(a.0), span)
+                    };
+                    let f = if all > 1e-9 { (done / all).clamp(0.0, 1.0) } else { 0.0 };
                     from(a).blend(&from(b), f)
                 }
             }
@@ -75,6 +84,22 @@ mod tests {
         let poses = carry(&rows, &[key(1, 0, 0.0), key(11, 1, 10.0)], &places);
         for (i, p) in poses.iter().enumerate() {
             assert!((p.x_m - 1.1 * i as f64).abs() < 1e-9, "row {i}: {p:?}");
+        }
+    }
+
+    #[test]
+    fn where_odometry_stands_still_rows_are_blended_by_number() {
+        let rows = vec![Pose2::default(); 9];
+        let places = BTreeMap::from([(0, Pose2::default())]);
+        let key = |rows_before: usize, x| Keyframe {
+            rows_before,
+            place: 0,
+            place_from_body: Pose2::new(x, 0.0, 0.0),
+            odom_from_body: Pose2::default(),
+        };
+        let poses = carry(&rows, &[key(1, 0.0), key(5, 0.4), key(9, 0.8)], &places);
+        for (i, p) in poses.iter().enumerate() {
+            assert!((p.x_m - 0.1 * i as f64).abs() < 1e-9, "row {i}: {p:?}");
         }
     }
 

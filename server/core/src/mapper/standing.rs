@@ -24,6 +24,8 @@ use serde::{Deserialize, Serialize};
 const SURE: f64 = 0.95;
 /// … or more likely wrong.
 const LIKELY: f64 = 0.5;
+/// Share of what is near that is not, where wheels and scans contradict each other.
+const EITHER: f64 = 0.4;
 /// Reasons that weigh less than this share of the heaviest are not told.
 const WORTH_TELLING: f64 = 0.5;
 
@@ -107,7 +109,14 @@ impl Standing {
             Some(stretch) => format!("nothing known seen since {:.0} m in the dark", stretch.path_m),
             None => "nothing known seen since it was dark".to_owned(),
         };
-        let (vague, split) = ((kept - at_best).max(0.0), (at_best - near).max(0.0));
+        let (mut vague, split) = ((kept - at_best).max(0.0), (at_best - near).max(0.0));
+        let mut cause = cause;
+        if let Some(contradiction) = front.contradiction() {
+            // One of the two is wrong, and which one nobody knows.
+            vague += EITHER * near;
+            near *= 1.0 - EITHER;
+            cause = contradiction;
+        }
         Doubt { near, vague, split, unresolved: filter.unresolved(), cause }
     }
 }

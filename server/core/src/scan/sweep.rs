@@ -98,15 +98,16 @@ pub fn sweep(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Sweep
 }
 
 fn hits(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Vec<Hit> {
-    let far = laser.range_max_m.min(RANGE_USED_MAX_M);
+    // Compared as it was sent: a "nothing seen" of 5.6 m is a hair less in 32 bits.
+    let far = (laser.range_max_m as f32).min(RANGE_USED_MAX_M as f32);
     let laser_from_body = laser.body_from_laser.inverse();
     let sign = if laser.upside_down { -1.0 } else { 1.0 };
     let mut hits = Vec::with_capacity(scan.ranges_m.len());
     for (beam, &range) in scan.ranges_m.iter().enumerate() {
+        let is_far = range >= far;
         let range = f64::from(range);
         let bearing = scan.angle_min_rad + beam as f64 * scan.angle_increment_rad;
-        // NaN fails every comparison.
-        if !(range >= laser.range_min_m && range < far) || ignored(laser, bearing) {
+        if range.is_nan() || range < laser.range_min_m || is_far || ignored(laser, bearing) {
             continue;
         }
         let (s, c) = (sign * bearing).sin_cos();

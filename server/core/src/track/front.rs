@@ -7,16 +7,18 @@
 //! sees nothing; the local maps on both sides are then tied as a whole (`front/bridge.rs`).
 
 use self::bridge::Dark;
+use self::contrast::Contrast;
 use self::registration::Stood;
+use self::trust::Trust;
 use crate::edge::PlaceId;
 use crate::event::StampNs;
-use crate::geometry::{Pose2, wrap};
+use crate::geometry::Pose2;
 use crate::scan::align::SIGMA_M;
 use crate::scan::place::Content;
 use crate::scan::sweep::Sweep;
 use crate::track::local::LocalMap;
 use crate::track::places::{Chain, FrozenPlace, OpenPlace, Placed};
-use crate::track::wheels::{Drift, Wheels};
+use crate::track::wheels::{Drift, Step, Wheels};
 use nalgebra::{Matrix3, Vector3};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -25,13 +27,10 @@ use std::collections::VecDeque;
 pub const LOCAL_PATH_M: f64 = 10.0;
 /// A place's content reaches so far to either side along the path.
 const CONTENT_REACH_M: f64 = 2.5;
-/// A scan becomes part of the local map after so much motion.
-const KEY_STEP_M: f64 = 0.25;
-const KEY_TURN_RAD: f64 = 0.35;
-/// Scans in the local map.
-const KEYS_MAX: usize = 60;
 /// A break of odometry longer than this may hide that the robot was carried off.
 const CARRIED_NS: i64 = 3_000_000_000;
+/// Path is counted in strides: what jitters at rest goes nowhere.
+const STRIDE_M: f64 = 0.05;
 /// A scan of fewer points sees nothing.
 const SEEN_MIN: usize = 10;
 /// So much path without a look at anything is a blind stretch.
@@ -71,9 +70,15 @@ pub struct FrontEnd {
     /// Of the newest scan.
     stamp_ns: StampNs,
     path_m: f64,
+    /// Where the last stride ended.
+    stride_from: Pose2,
     wheels: Wheels,
+    trust: Trust,
+    contrast: Contrast,
     /// Distance of what is seen from the local map's surfaces, root mean square.
     rough_m: f64,
+    /// Share of a scan's points that usually lie on known surfaces.
+    usual_share: f64,
     /// What the pose in the local map is off by.
     in_map: Drift,
     /// What the pose relative to the last place is off by.
@@ -104,8 +109,12 @@ impl FrontEnd {
             odom_from_body: None,
             stamp_ns: 0,
             path_m: 0.0,
+            stride_from: Pose2::default(),
             wheels: Wheels::default(),
+            trust: Trust::default(),
+            contrast: Contrast::default(),
             rough_m: SIGMA_M,
+            usual_share: 1.0,
             in_map: Drift::default(),
             since_place: Drift::default(),
             failed: FAILED_MIN,
@@ -153,6 +162,16 @@ impl FrontEnd {
         self.wheels.unseen_m()
     }
 
+    /// Whether odometry stands still while scans move.
+    pub fn wheels_stand_still(&self) -> bool {
+        self.contrast.stands_still()
+    }
+
+    /// How wheels and scans contradict each other in the long run; none if they do not.
+    pub fn contradiction(&self) -> Option<String> {
+        self.contrast.contradiction()
+    }
+
     /// Whether the newest motion is odometry's alone, too far to be a scan or two that failed.
     pub fn sees_nothing(&self) -> bool {
         self.unseen_m() > UNSEEN_SHARE * self.spacing_m
@@ -169,9 +188,13 @@ impl FrontEnd {
             }
         } else if let Some(before) = self.odom_from_body {
             let dt_s = stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9;
-            let stood = Stood { front_from_body: self.front_from_body, dt_s };
-            self.predict(&before.between(&odom_from_body), dt_s);
-            if !blind && (self.is_dark() || self.is_vague()) {
+            let stood = self.predict(&before.between(&odom_from_body), dt_s);
+            if !blind && self.trust.is_adrift() {
+                if !self.resume(&sweep) {
+                    frozen = self.start_over();
+                }
+                self.trust.settle();
+            } else if !blind && (self.is_dark() || self.is_vague()) {
                 self.land();
                 frozen = self.freeze(self.path_m);
                 self.clear_local();
@@ -180,6 +203,7 @@ impl FrontEnd {
             }
         }
         (self.odom_from_body, self.stamp_ns) = (Some(odom_from_body), stamp_ns);
+        self.stride();
         // In the dark, places begin only after some path: until then one edge spans it, and what the
         // next scan says of it is exactly what it is worth.
         let hold = blind && !self.open.is_empty() && self.wheels.unseen_m() < DARK_PATH_M;
@@ -195,6 +219,9 @@ impl FrontEnd {
             self.bridge();
         }
         let new = self.front_from_body;
+        if new != old {
+            self.stride_from = new;
+        }
         let new_from_old = (new != old).then(|| new.compose(&old.inverse()));
         frozen.extend(self.freeze(self.path_m - CONTENT_REACH_M));
         let (place, place_from_body) = self
@@ -224,13 +251,36 @@ impl FrontEnd {
         frozen
     }
 
-    fn predict(&mut self, increment: &Pose2, dt_s: f64) {
-        let step = self.wheels.drive(increment, dt_s);
+    /// Moves the body as wheels say, or if these are not believed as scans last saw it move.
+    fn predict(&mut self, increment: &Pose2, dt_s: f64) -> Stood {
+        let mut step = self.wheels.drive(increment, dt_s);
+        self.contrast.drive(increment);
+        let front_from_body = self.front_from_body;
+        let mut in_map = self.in_map;
+        in_map.drive(&step);
+        let stood = Stood {
+            front_from_body,
+            dt_s,
+            by_wheels: front_from_body.compose(&step.motion),
+            spread: in_map.covariance(&self.wheels),
+        };
+        let (motion, noise) = self.trust.pass(dt_s, *increment != Pose2::default());
+        if self.trust.is_lost() {
+            step = Step::guess(motion, noise);
+        }
         self.in_map.drive(&step);
         self.since_place.drive(&step);
         self.drive_dark(&step);
-        self.front_from_body = self.front_from_body.compose(&step.motion);
-        self.path_m += step.motion.x_m.hypot(step.motion.y_m);
+        self.front_from_body = front_from_body.compose(&step.motion);
+        stood
+    }
+
+    fn stride(&mut self) {
+        let stride_m = self.stride_from.distance_m(&self.front_from_body);
+        if stride_m >= STRIDE_M {
+            self.path_m += stride_m;
+            self.stride_from = self.front_from_body;
+        }
     }
 
     /// Whether the robot drove on blindly until its pose in the local map was too uncertain for a
@@ -249,6 +299,8 @@ impl FrontEnd {
         self.path_m += 2.0 * LOCAL_PATH_M;
         self.in_map = Drift::default();
         self.wheels.lift();
+        self.contrast.lift();
+        self.stride_from = self.front_from_body;
     }
 
     /// The link to what was is lost: a new local map, and a chain edge that says next to nothing.
@@ -299,45 +351,6 @@ impl FrontEnd {
         }
         true
     }
-
-    /// Adds the scan to the local map if it shows it from a pose new to the last metres of path: what
-    /// is older leaves both the local map and the places to come.
-    fn keep_key(&mut self, sweep: Sweep) {
-        let near = |k: &Key| {
-            self.path_m - k.path_m < CONTENT_REACH_M
-                && k.front_from_body.distance_m(&self.front_from_body) < KEY_STEP_M
-                && wrap(k.front_from_body.yaw_rad - self.front_from_body.yaw_rad).abs() < KEY_TURN_RAD
-        };
-        if sweep.points.is_empty() || self.keys.iter().rev().take(KEYS_MAX / 2).any(near) {
-            return;
-        }
-        self.keys.push_back(Key { front_from_body: self.front_from_body, path_m: self.path_m, sweep });
-        let keep_from_m = self.path_m - LOCAL_PATH_M;
-        let gone = |keys: &VecDeque<Key>| {
-            keys.len() > KEYS_MAX || keys.front().is_some_and(|k| k.path_m < keep_from_m)
-        };
-        let mut left = Vec::new();
-        while gone(&self.keys) {
-            left.extend(self.keys.pop_front());
-        }
-        if let (Some(local), Some(new)) = (&mut self.local, self.keys.back()) {
-            local.add(&new.sweep.points, &new.front_from_body, new.path_m);
-            for key in left {
-                local.take_away(&key.sweep.points, &key.front_from_body, key.path_m);
-            }
-        }
-    }
-
-    fn local(&mut self) -> &LocalMap {
-        let keys = &self.keys;
-        self.local.get_or_insert_with(|| {
-            let mut local = LocalMap::default();
-            for key in keys {
-                local.add(&key.sweep.points, &key.front_from_body, key.path_m);
-            }
-            local
-        })
-    }
 }
 
 /// What some scans show, in a frame.
@@ -347,6 +360,9 @@ fn content<'a>(keys: impl Iterator<Item = &'a Key>, front_from_frame: &Pose2) ->
 }
 
 mod bridge;
+mod contrast;
+mod keys;
 mod registration;
 #[cfg(test)]
 mod tests;
+mod trust;

@@ -65,11 +65,13 @@ struct Tile {
 #[derive(Clone, Debug, PartialEq)]
 pub struct LocalMap {
     tiles: Vec<Tile>,
+    /// Whether all in it is taken to stand.
+    pub(super) all_stands: bool,
 }
 
 impl Default for LocalMap {
     fn default() -> Self {
-        Self { tiles: vec![Tile::default(); (TABLE * TABLE) as usize] }
+        Self { tiles: vec![Tile::default(); (TABLE * TABLE) as usize], all_stands: false }
     }
 }
 
@@ -146,7 +148,10 @@ impl Surfaces for LocalMap {
                 }
             }
         }
-        best.map(|(tile, k)| Nearest { point: &tile.points[k], stands: tile.sums[k].1.stands() })
+        best.map(|(tile, k)| Nearest {
+            point: &tile.points[k],
+            stands: self.all_stands || tile.sums[k].1.stands(),
+        })
     }
 }
 

@@ -8,19 +8,21 @@
 
 pub mod front;
 mod local;
+mod looks;
 pub mod odometry;
 pub mod places;
 mod wheels;
 
-use crate::effects::{Effect, Effects};
+use crate::effects::{Effect, Effects, Suspicion};
 use crate::event::{Laser, Odom, Scan, Setup, StampNs};
 use crate::geometry::Pose2;
-use crate::scan::sweep::sweep;
+use crate::scan::sweep::{Sweep, sweep};
 use crate::track::front::FrontEnd;
+use crate::track::looks::Looks;
 use crate::track::odometry::{Odometry, Step};
 use crate::track::places::FrozenPlace;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
 /// Scans that wait for odometry to bracket their sweep.
 const WAITING_MAX: usize = 64;
@@ -34,8 +36,21 @@ pub struct Track {
     pub front: FrontEnd,
     lasers: BTreeMap<String, Laser>,
     odometry: Odometry,
-    waiting: VecDeque<Scan>,
+    waiting: VecDeque<Waiting>,
     scans: u64,
+    /// Of each laser.
+    looks: BTreeMap<String, Looks>,
+    /// What was told of its senses.
+    suspected: BTreeSet<Suspicion>,
+}
+
+/// A scan that waits for odometry.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct Waiting {
+    /// As it came.
+    pub scan: Scan,
+    /// When it was taken, by odometry's clock.
+    taken_ns: StampNs,
 }
 
 /// What came of a scan that found its pose.
@@ -59,6 +74,8 @@ impl Track {
             odometry: Odometry::default(),
             waiting: VecDeque::new(),
             scans: 0,
+            looks: BTreeMap::new(),
+            suspected: BTreeSet::new(),
         }
     }
 
@@ -71,7 +88,7 @@ impl Track {
     pub fn odom(&mut self, odom: &Odom, effects: &mut Effects) {
         if let Step::Broken(reason) = self.odometry.push(odom) {
             // What still waits belongs to the old segment, whose odometry is gone.
-            for scan in self.waiting.drain(..) {
+            for Waiting { scan, .. } in self.waiting.drain(..) {
                 let reason = "odometry broke before it covered the sweep".to_owned();
                 effects.push(Effect::ScanDropped { stamp_ns: scan.stamp_ns, reason });
             }
@@ -83,7 +100,16 @@ impl Track {
     /// Takes a scan, to wait for its odometry.
     pub fn scan(&mut self, scan: Scan, effects: &mut Effects) {
         if self.lasers.contains_key(&scan.laser) {
-            self.waiting.push_back(scan);
+            let looks = self.looks.entry(scan.laser.clone()).or_default();
+            let (taken_ns, apart_ns) = looks.taken_ns(&scan, self.odometry.newest_ns());
+            if let Some(apart_ns) = apart_ns {
+                let (s, laser) = (apart_ns as f64 * 1e-9, &scan.laser);
+                let why = format!(
+                    "stamps of laser {laser:?} are {s:.1} s behind odometry's: the newest odometry is used"
+                );
+                self.suspect(scan.stamp_ns, Suspicion::Clocks, why, effects);
+            }
+            self.waiting.push_back(Waiting { scan, taken_ns });
         } else {
             let reason = format!("laser {:?} was never set up", scan.laser);
             effects.push(Effect::ScanDropped { stamp_ns: scan.stamp_ns, reason });
@@ -91,7 +117,7 @@ impl Track {
     }
 
     /// The next scan that odometry brackets, or whose time is up. `now_ns` None: whichever is next.
-    pub fn next_due(&mut self, now_ns: Option<StampNs>) -> Option<Scan> {
+    pub fn next_due(&mut self, now_ns: Option<StampNs>) -> Option<Waiting> {
         let end_ns = sweep_end_ns(self.waiting.front()?);
         let bracketed = self.odometry.newest_ns().is_some_and(|newest| newest >= end_ns);
         let late = now_ns.is_none_or(|now| now.saturating_sub(end_ns) > WAIT_NS);
@@ -99,9 +125,10 @@ impl Track {
     }
 
     /// Registers a scan to the local map.
-    pub fn place(&mut self, scan: &Scan, effects: &mut Effects) -> Option<Placed> {
+    pub fn place(&mut self, waiting: &Waiting, effects: &mut Effects) -> Option<Placed> {
+        let Waiting { scan, taken_ns } = waiting;
         let stamp_ns = scan.stamp_ns;
-        let Some(odom_from_body) = self.odometry.at(stamp_ns) else {
+        let Some(odom_from_body) = self.odometry.at(*taken_ns) else {
             effects.push(Effect::ScanDropped { stamp_ns, reason: "no odometry yet".to_owned() });
             return None;
         };
@@ -109,10 +136,14 @@ impl Track {
         let odometry = &self.odometry;
         let motion = |dt_s: f64| {
             odometry
-                .at(stamp_ns.saturating_add((dt_s * 1e9) as i64))
+                .at(taken_ns.saturating_add((dt_s * 1e9) as i64))
                 .map_or(Pose2::default(), |p| odom_from_body.between(&p))
         };
-        let placed = self.front.scan(stamp_ns, odom_from_body, sweep(scan, laser, motion));
+        let mut seen = sweep(scan, laser, motion);
+        let range_max_m = laser.range_max_m;
+        self.look(scan, range_max_m, &odom_from_body, &mut seen, effects);
+        let placed = self.front.scan(stamp_ns, odom_from_body, seen);
+        self.compare(stamp_ns, effects);
         let (place, place_from_body) = (placed.place, placed.place_from_body);
         let scan = self.scans;
         effects.push(Effect::ScanPlaced { scan, stamp_ns, place, place_from_body, odom_from_body });
@@ -123,9 +154,49 @@ impl Track {
         let places::Placed { began, frozen, new_from_old, .. } = placed;
         Some(Placed { began, frozen, odom_from_body, new_from_old })
     }
+
+    /// Looks whether a scan is a look at anything; one that is not shows nothing.
+    fn look(&mut self, scan: &Scan, range_max_m: f64, odom: &Pose2, seen: &mut Sweep, effects: &mut Effects) {
+        let laser = &scan.laser;
+        let looks = self.looks.entry(laser.clone()).or_default();
+        let is_frozen = looks.is_frozen(scan, odom);
+        let is_blind = looks.is_blind(seen.points.len(), odom);
+        if is_frozen {
+            seen.points.clear();
+            let why = format!("laser {laser:?} repeats one scan, bit by bit, while the robot drives");
+            self.suspect(scan.stamp_ns, Suspicion::Frozen, why, effects);
+        } else if is_blind {
+            let beyond =
+                scan.ranges_m.iter().copied().filter(|r| r.is_finite() && f64::from(*r) > range_max_m);
+            let nearest_m = beyond.fold(f32::INFINITY, f32::min);
+            let units = if nearest_m.is_finite() && f64::from(nearest_m) > 2.0 * range_max_m {
+                format!("; the nearest is at {nearest_m:.0} m: are they millimetres?")
+            } else {
+                String::new()
+            };
+            let why = format!("laser {laser:?} sees nothing within its range of {range_max_m} m{units}");
+            self.suspect(scan.stamp_ns, Suspicion::Blind, why, effects);
+        }
+    }
+
+    /// Whether scans and wheels agree in the long run.
+    fn compare(&mut self, stamp_ns: StampNs, effects: &mut Effects) {
+        if self.front.wheels_stand_still() {
+            let why = "odometry stands still while scans move: they alone tell the way".to_owned();
+            self.suspect(stamp_ns, Suspicion::Still, why, effects);
+        } else if let Some(why) = self.front.contradiction() {
+            self.suspect(stamp_ns, Suspicion::Contradiction, why, effects);
+        }
+    }
+
+    fn suspect(&mut self, stamp_ns: StampNs, what: Suspicion, why: String, effects: &mut Effects) {
+        if self.suspected.insert(what) {
+            effects.push(Effect::Suspected { stamp_ns, what, why });
+        }
+    }
 }
 
-fn sweep_end_ns(scan: &Scan) -> StampNs {
+fn sweep_end_ns(Waiting { scan, taken_ns }: &Waiting) -> StampNs {
     let beams = scan.ranges_m.len().saturating_sub(1) as f64;
-    scan.stamp_ns.saturating_add((scan.time_increment_s.max(0.0) * beams * 1e9) as i64)
+    taken_ns.saturating_add((scan.time_increment_s.max(0.0) * beams * 1e9) as i64)
 }

@@ -56,6 +56,13 @@ pub struct Step {
     by_errors: Matrix3<f64>,
 }
 
+impl Step {
+    /// A motion that wheels know nothing of.
+    pub fn guess(motion: Pose2, noise: Matrix3<f64>) -> Self {
+        Self { motion, noise, by_errors: Matrix3::zeros() }
+    }
+}
+
 /// What a pose that is told by wheels alone is off by, right perturbation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Drift {

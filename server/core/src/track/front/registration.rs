@@ -1,7 +1,7 @@
 //! A scan laid on the local map, and what that is worth.
 
 use crate::geometry::Pose2;
-use crate::scan::align::{Alignment, CORRELATED_BEAMS, Prior, SIGMA_M, align};
+use crate::scan::align::{Alignment, CORRELATED_BEAMS, Prior, SIGMA_M, align, sound_information};
 use crate::scan::cloud::{Point, thin};
 use crate::scan::place::VOXEL_M;
 use crate::scan::sweep::Sweep;
@@ -20,6 +20,11 @@ const TURN_MAX_RAD_S: f64 = 4.0;
 const SHARE_SURE: f64 = 0.6;
 /// Below it the scan says nothing about the pose.
 const SHARE_MIN: f64 = 0.25;
+/// A fit of so much less than usual is suspected to be held where wheels want it, and so much more shows that it is.
+const LESS: f64 = 0.05;
+const MORE: f64 = 0.08;
+/// How fast what is usual is learned, per scan.
+const USUAL_GAIN: f64 = 0.05;
 /// Wheels err with a bias (a scale, a bent axle), and fused at each scan a bias adds up: odometry
 /// decides only where the scans say next to nothing.
 const ODOMETRY_TRUST: f64 = 0.02;
@@ -44,14 +49,19 @@ const RESUMED: f64 = 0.2;
 /// φ where a scan that shows something is laid on nothing, or hardly.
 const UNREGISTERED: f64 = 0.03;
 const HARDLY_REGISTERED: f64 = 0.003;
+/// φ where wheels are not believed besides.
+const NEITHER: f64 = 0.2;
 /// φ where scans and wheels part by so much, distance².
 const PARTED: [(f64, f64); 2] = [(36.0, 0.003), (100.0, 0.02)];
 
-/// Where the body was at the scan before, so long ago.
+/// Where the body was at the scan before, so long ago, and where wheels say that it is now.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stood {
     pub front_from_body: Pose2,
     pub dt_s: f64,
+    pub by_wheels: Pose2,
+    /// Covariance of that.
+    pub spread: Matrix3<f64>,
 }
 
 impl Stood {
@@ -75,29 +85,52 @@ impl FrontEnd {
             where_weak: ODOMETRY_TRUST_ALONE / ODOMETRY_TRUST,
         };
         let points = thin(&sweep.points, VOXEL_M);
-        let moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
+        let mut moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
+        let is_lost = self.trust.is_lost();
         let mut found = self.register(&points, &prior);
         if found.is_none() || leaps(&stood.front_from_body.between(&self.front_from_body)) {
             let as_good = |a: &Alignment| found.is_none_or(|f| a.inlier_share >= f.inlier_share);
             let reached = self.around(&points, &stood.front_from_body, |pose| stood.reaches(pose));
             found = reached.filter(as_good).or(found);
         }
+        if found.is_some_and(|f| f.inlier_share < self.usual_share - LESS) {
+            let rival = self.freely(&points, &self.front_from_body.clone());
+            let better = |r: &Alignment| found.is_none_or(|f| r.inlier_share >= f.inlier_share + MORE);
+            found = rival.filter(|r| better(r) && stood.reaches(&r.target_from_source)).or(found);
+        }
         let Some(found) = found else {
-            self.doubt(UNREGISTERED);
+            self.doubt(if is_lost { NEITHER } else { UNREGISTERED });
             return;
         };
         if found.inlier_share < SHARE_SURE {
+            self.doubt(if is_lost { UNREGISTERED } else { HARDLY_REGISTERED });
+        } else if is_lost {
             self.doubt(HARDLY_REGISTERED);
         }
         let parted = self.front_from_body.between(&found.target_from_source).log();
         self.doubt(failed_by(parted.dot(&(information * parted))));
         self.front_from_body = found.target_from_source;
+        self.usual_share += USUAL_GAIN * (found.inlier_share - self.usual_share);
         self.rough_m += ROUGH_GAIN * (found.residual_m - self.rough_m);
         let rough = (self.rough_m / SIGMA_M).powi(2);
         // So many independent looks at surfaces, however dense the beams.
         let per_point = surfaces_m(sweep) / LOOK_M / points.len() as f64;
         let look = found.information * (CORRELATED_BEAMS * per_point / rough);
         let map = Matrix3::from_diagonal(&MAP_SIGMAS.component_mul(&MAP_SIGMAS)) * rough;
+        let moved = stood.front_from_body.between(&found.target_from_source);
+        if is_lost {
+            moved_m = moved_m.max(moved.x_m.hypot(moved.y_m) + LOOK_PATH_PER_RAD_M * moved.yaw_rad.abs());
+        }
+        let said = if is_lost {
+            sound_information(&points, self.local(), &found, GATE_M / 8.0)
+        } else {
+            found.information
+        };
+        let said = said * (CORRELATED_BEAMS * per_point / rough) + Matrix3::identity();
+        if let Some(told) = said.try_inverse() {
+            let parted = stood.by_wheels.between(&found.target_from_source).log();
+            self.trust.saw(&moved, &parted, &(stood.spread + told + map));
+        }
         let fuse = |p: &Matrix3<f64>, look: Matrix3<f64>| -> Option<Matrix3<f64>> {
             (p.try_inverse()? + look).try_inverse().map(|m| (m + m.transpose()) * 0.5)
         };
@@ -106,12 +139,20 @@ impl FrontEnd {
         let news = (moved_m / LOOK_PATH_M).min(1.0);
         let since_place = self.since_place();
         self.since_place = Drift::of(fuse(&since_place, look * news).unwrap_or(since_place));
-        self.wheels.told(&self.front_from_body, &in_map);
+        self.contrast.saw(&self.front_from_body);
+        if self.trust.is_lost() {
+            self.wheels.lift();
+        } else {
+            self.wheels.told(&self.front_from_body, &in_map);
+        }
     }
 
     fn register(&mut self, points: &[Point], prior: &Prior) -> Option<Alignment> {
         let guess = prior.target_from_source;
+        // Without wheels nothing else tells the way along what seems bare.
+        let all_stands = self.trust.is_lost() && self.is_short();
         let local = self.local();
+        local.all_stands = all_stands;
         let mut best = align(points, local, &guess, Some(prior), GATE_M);
         if best.is_none_or(|b| b.inlier_share < SHARE_SURE) {
             // A fast turn or a slip: start from other headings too.
@@ -126,6 +167,17 @@ impl FrontEnd {
             }
         }
         best.filter(|b| b.inlier_share >= SHARE_MIN)
+    }
+
+    /// Where the points fit near a pose if wheels say nothing.
+    fn freely(&mut self, points: &[Point], near: &Pose2) -> Option<Alignment> {
+        let information = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
+        let prior = Prior { target_from_source: *near, information, where_weak: 1.0 };
+        let is_short = self.is_short();
+        let local = self.local();
+        local.all_stands = is_short;
+        let found = align(points, local, near, Some(&prior), GATE_M);
+        found.filter(|f| f.inlier_share >= SHARE_SURE)
     }
 
     /// Where in the local map that it may be, from a place and any heading, the points surely fit.
@@ -153,7 +205,9 @@ impl FrontEnd {
         let here = self.front_from_body;
         let Some(found) = self.around(&thin(&sweep.points, VOXEL_M), &here, |_| true) else { return false };
         self.front_from_body = found.target_from_source;
+        self.stride_from = self.front_from_body;
         self.wheels.lift();
+        self.contrast.lift();
         self.doubt(RESUMED);
         true
     }

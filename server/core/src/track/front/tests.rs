@@ -355,3 +355,14 @@ fn after_long_in_the_dark_a_look_alike_is_not_taken_for_what_was_left() {
     assert!(made.distance_m(&told) < 0.5, "{made:?} {told:?}");
     assert!(covariance.fixed_view::<2, 2>(0, 0).trace().sqrt() > 0.7, "{covariance}");
 }
+
+#[test]
+fn without_odometry_scans_alone_make_places() {
+    let mut front = FrontEnd::new(1.0);
+    for k in 0..60 {
+        let pose = Pose2::new(-3.0 + 0.1 * f64::from(k), -1.0, 0.0);
+        front.scan(i64::from(k) * 200_000_000, Pose2::default(), seen(&pose, false));
+    }
+    assert!((front.front_from_body.x_m - 5.9).abs() < 0.05, "{:?}", front.front_from_body);
+    assert_eq!(front.next_place, 6);
+}

@@ -1,0 +1,158 @@
+//! Whether wheels are to be believed, by what scans say they did.
+//!
+//! At each scan wheels predict a motion, and registration finds one. They part by e = log(predicted⁻¹ · found).
+//! Wheels are right, or they are not (they slip, spin, stand still while somebody pushes): a chain of two states,
+//!
+//! ```text
+//! p(right → wrong) = FAILS,  p(wrong → right) = RECOVERS,    per scan
+//! p(e | right) = Π_k N(e_k; S_k) with a tail,   p(e | wrong) = Π_k ½ p(e_k | right) + ½ N(e_k; S_k + W_k)
+//! ```
+//!
+//! with S the variances of both together, W what robots can do meanwhile (who slips ahead need not turn), filtered forwards. While they are more likely wrong than right, the robot is
+//! thought to go on as scans last saw it move. Scans that see nothing say nothing: then what is known decays
+//! towards how often wheels are wrong at all.
+
+use crate::geometry::Pose2;
+use nalgebra::{Matrix3, Vector3};
+use serde::{Deserialize, Serialize};
+
+/// Per scan: a slip in some thousand, and it lasts some ten.
+const FAILS: f64 = 3e-4;
+const RECOVERS: f64 = 0.1;
+/// Of wheels that are right, so many scans part from them three times as far: people walk by.
+const TAIL: f64 = 0.02;
+/// What robots do, one standard deviation: speed, and what a scan or two that came late add.
+const SPEED_M_S: f64 = 0.7;
+const SPEED_RAD_S: f64 = 0.7;
+const LATE_M: f64 = 0.05;
+const LATE_RAD: f64 = 0.05;
+/// How much a speed changes within a second.
+const FASTER_M_S2: f64 = 0.7;
+const FASTER_RAD_S2: f64 = 1.5;
+/// After so long without a look and without wheels the robot may have been carried off.
+const ADRIFT_S: f64 = 3.0;
+/// A speed that scans saw longer ago says nothing any more.
+const SEEN_LATELY_S: f64 = 1.0;
+
+/// What is thought of the wheels.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub(super) struct Trust {
+    /// Probability that they are wrong now.
+    wrong: f64,
+    /// The body's speed as scans last saw it: x, y, yaw per second, and since how long it is not seen.
+    speed: Vector3<f64>,
+    unseen_s: f64,
+}
+
+impl Default for Trust {
+    fn default() -> Self {
+        Self { wrong: FAILS / RECOVERS, speed: Vector3::zeros(), unseen_s: 0.0 }
+    }
+}
+
+impl Trust {
+    /// Whether they are more likely wrong than right.
+    pub fn is_lost(&self) -> bool {
+        self.wrong > 0.5
+    }
+
+    /// Whether neither scans nor wheels have told for so long where the robot goes that it may be anywhere.
+    pub fn is_adrift(&self) -> bool {
+        self.is_lost() && self.unseen_s > ADRIFT_S
+    }
+
+    /// Where the body is has been found otherwise.
+    pub fn settle(&mut self) {
+        (self.speed, self.unseen_s) = (Vector3::zeros(), 0.0);
+    }
+
+    /// Time passes: the motion expected if wheels are not believed, and its covariance. That wheels which stand still
+    /// work again shows when they move.
+    pub fn pass(&mut self, dt_s: f64, wheels_move: bool) -> (Pose2, Matrix3<f64>) {
+        let recovers = if wheels_move { RECOVERS } else { 0.0 };
+        self.wrong = self.wrong * (1.0 - recovers) + (1.0 - self.wrong) * FAILS;
+        self.unseen_s += dt_s;
+        let still_known = self.unseen_s - dt_s < SEEN_LATELY_S;
+        let motion = if still_known { Pose2::exp(&(self.speed * dt_s)) } else { Pose2::default() };
+        let (d_m, turn_rad) = if still_known {
+            (FASTER_M_S2 * dt_s * dt_s + 0.01, FASTER_RAD_S2 * dt_s * dt_s + 0.01)
+        } else {
+            (SPEED_M_S * dt_s + LATE_M, SPEED_RAD_S * dt_s + LATE_RAD)
+        };
+        (motion, squares(d_m, turn_rad))
+    }
+
+    /// Scans saw a motion, off from that of the wheels by `parted`; `spread`: S.
+    pub fn saw(&mut self, moved: &Pose2, parted: &Vector3<f64>, spread: &Matrix3<f64>) {
+        let dt_s = std::mem::take(&mut self.unseen_s);
+        if dt_s > 0.0 {
+            self.speed = moved.log() / dt_s;
+        }
+        let may = [SPEED_M_S * dt_s + LATE_M, SPEED_M_S * dt_s + LATE_M, SPEED_RAD_S * dt_s + LATE_RAD];
+        let (mut right, mut wrong) = (1.0, 1.0);
+        for (k, may) in may.into_iter().enumerate() {
+            let (e, variance) = (parted[k], spread[(k, k)]);
+            let as_told = (1.0 - TAIL) * normal(e, variance) + TAIL * normal(e, 9.0 * variance);
+            right *= as_told;
+            wrong *= 0.5 * as_told + 0.5 * normal(e, variance + may * may);
+        }
+        let sum = self.wrong * wrong + (1.0 - self.wrong) * right;
+        if sum > 0.0 {
+            // Neither is ever impossible.
+            self.wrong = (self.wrong * wrong / sum).clamp(1e-6, 1.0 - 1e-3);
+        }
+    }
+}
+
+fn squares(d_m: f64, turn_rad: f64) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::new(d_m * d_m, d_m * d_m, turn_rad * turn_rad))
+}
+
+/// N(e; variance), but for a constant factor.
+fn normal(e: f64, variance: f64) -> f64 {
+    (-0.5 * e * e / variance).exp() / variance.sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Scans and wheels part by so much, ten times a second.
+    fn part(trust: &mut Trust, times: usize, by_m: f64) {
+        for _ in 0..times {
+            trust.pass(0.1, true);
+            let parted = Vector3::new(by_m, 0.0, 0.0);
+            trust.saw(&Pose2::new(0.05, 0.0, 0.0), &parted, &squares(0.008, 0.004));
+        }
+    }
+
+    #[test]
+    fn a_slip_is_noticed_at_once_and_forgotten_soon() {
+        let mut trust = Trust::default();
+        part(&mut trust, 100, 0.004);
+        assert!(trust.wrong < 0.01, "{trust:?}");
+        part(&mut trust, 1, 0.5);
+        assert!(trust.is_lost(), "{trust:?}");
+        part(&mut trust, 10, 0.004);
+        assert!(!trust.is_lost(), "{trust:?}");
+    }
+
+    #[test]
+    fn wheels_that_stand_still_are_not_believed_and_the_robot_goes_on() {
+        let mut trust = Trust::default();
+        part(&mut trust, 10, 0.05);
+        assert!(trust.is_lost(), "{trust:?}");
+        let (motion, _) = trust.pass(0.1, false);
+        assert!((motion.x_m - 0.05).abs() < 1e-9, "{motion:?}");
+    }
+
+    #[test]
+    fn somebody_who_walks_by_makes_no_slip() {
+        let mut trust = Trust::default();
+        for _ in 0..20 {
+            part(&mut trust, 1, 0.024);
+            part(&mut trust, 20, 0.003);
+            assert!(!trust.is_lost(), "{trust:?}");
+        }
+    }
+}
