@@ -17,11 +17,11 @@ pub struct Keyframe {
     pub odom_from_body: Pose2,
 }
 
-/// Paths of which one is half the other's, and that differ by more, metres plus radians, are not the same way.
+/// Who went twice as far as odometry says, and by more than that, metres plus radians, went unnoticed by it.
 const UNLIKE: f64 = 0.02;
 
 /// Poses of odometry `rows` (in order of arrival) in the map: odometry since the keyframe before
-/// and back from the keyframe after, blended by odometry's path, or if that is not the way that was gone by rows. Keyframes are in order of arrival; those
+/// and back from the keyframe after, blended by odometry's path, or by rows if it hardly noticed the way. Keyframes are in order of arrival; those
 /// whose place is not in `places` are passed over. Before the first keyframe and after the last,
 /// the one that there is; with no keyframe at all, odometry itself.
 pub fn carry(rows: &[Pose2], keyframes: &[Keyframe], places: &BTreeMap<PlaceId, Pose2>) -> Vec<Pose2> {
@@ -49,7 +49,7 @@ pub fn carry(rows: &[Pose2], keyframes: &[Keyframe], places: &BTreeMap<PlaceId, 
                     let at = |r: usize| path_m[r.saturating_sub(1)];
                     let span = at(b.0) - at(a.0);
                     let moved = a.1.distance_m(&b.1) + wrap_abs(&a.1, &b.1);
-                    let (done, all) = if (span - moved).abs() > UNLIKE.max(0.5 * span.max(moved)) {
+                    let (done, all) = if moved > 2.0 * span + UNLIKE {
                         ((i + 1).saturating_sub(a.0) as f64, (b.0 - a.0) as f64)
                     } else {
                         (path_m[i] - at(a.0), span)

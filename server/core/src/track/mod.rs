@@ -159,7 +159,8 @@ impl Track {
     fn look(&mut self, scan: &Scan, range_max_m: f64, odom: &Pose2, seen: &mut Sweep, effects: &mut Effects) {
         let laser = &scan.laser;
         let looks = self.looks.entry(laser.clone()).or_default();
-        let is_frozen = looks.is_frozen(scan, odom);
+        // Of nothing at all there is only one picture.
+        let is_frozen = looks.is_frozen(scan, odom) && !seen.points.is_empty();
         let is_blind = looks.is_blind(seen.points.len(), odom);
         if is_frozen {
             seen.points.clear();
