@@ -6,7 +6,7 @@
 use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
+use std::time::{Duration, SystemTime};
 use toponym_core::Mapper;
 use toponym_journal::disk::sync_folder;
 use toponym_journal::{Checkpoint, Entry, Folder, Identity, Journal, JournalError, Opened};
@@ -115,6 +115,12 @@ impl Store {
         ids.sort();
         ids.dedup();
         Ok(ids)
+    }
+
+    /// When something was last written to a map's folder; none if that can't be told.
+    pub fn written_at(&self, id: &str) -> Option<SystemTime> {
+        let times = fs::read_dir(self.folder.join(id)).ok()?.flatten().map(|e| e.metadata()?.modified());
+        times.flatten().max()
     }
 
     /// Reads a map. `hold`: how long the stream of one of an earlier build waits for sentences.

@@ -50,10 +50,10 @@ async fn an_idle_map_makes_room_and_is_brought_back() {
     let folder = Folder::new();
     let mut config = settings(&folder);
     (config.limits.maps, config.limits.map_idle_s) = (1, 0);
-    let site = Site::start(config).await;
-    let graphs = site.listen(site.keys.graph("one")).await;
+    let site = Site::start(config.clone()).await;
+    let graphs = site.listen(site.keys.graph("zoo")).await;
     let acks = site.acks("r1").await;
-    for message in drive("r1", "one").iter().take(81) {
+    for message in drive("r1", "zoo").iter().take(81) {
         site.send(message).await;
     }
     acks.ack_of(80).await;
@@ -61,21 +61,29 @@ async fn an_idle_map_makes_room_and_is_brought_back() {
     graphs.until(|graph: &GraphReply| graph.places.len() > 3).await;
     let info: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
     let (acks, states) = (site.acks("r2").await, site.states("r1").await);
-    for message in drive("r2", "two").iter().take(41) {
+    for message in drive("r2", "annex").iter().take(41) {
         site.send(message).await;
     }
     acks.ack_of(40).await;
-    let gone = site.ask(&site.keys.ask("one", Ask::Labels), "").await.unwrap_err();
+    let gone = site.ask(&site.keys.ask("zoo", Ask::Labels), "").await.unwrap_err();
     assert!(gone.code == ErrorCode::NoSuchMap && gone.message.contains("made room"), "{gone:?}");
 
     // It says its setup again, and goes on where it was.
     states.state(|state| state.map.is_none()).await;
-    site.send(&hall::setup(header("r1", 81), "one")).await;
-    states.state(|state| state.map.as_deref() == Some("one")).await;
+    site.send(&hall::setup(header("r1", 81), "zoo")).await;
+    states.state(|state| state.map.as_deref() == Some("zoo")).await;
     let back: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
     assert_eq!((&back.maps[0].uuid, back.maps.len()), (&info.maps[0].uuid, 1));
     site.stop().await;
-    assert!(!toponym_core::Mapper::load(&saved_map(&folder, "one")).unwrap().snapshot().is_empty());
+    // Of those on disk the one is at hand that was written to last, and its robot is known.
+    let site = Site::start(config).await;
+    let info: Info = serde_json::from_value(site.ask(&site.keys.info(), "").await.unwrap()).unwrap();
+    assert_eq!(info.maps.iter().map(|map| map.id.as_str()).collect::<Vec<_>>(), ["zoo"]);
+    let acks = site.acks("r2").await;
+    site.send(&hall::setup(header("r2", 41), "annex")).await;
+    assert_eq!(acks.ack_of(41).await.lost, 0, "it goes on behind what it sent before");
+    site.stop().await;
+    assert!(!toponym_core::Mapper::load(&saved_map(&folder, "zoo")).unwrap().snapshot().is_empty());
 }
 
 #[tokio::test(flavor = "multi_thread")]

@@ -154,6 +154,11 @@ impl Mapper {
         Ok(mapper)
     }
 
+    /// What seems wrong with the robot's senses, each kind once, in words.
+    pub fn suspicions(&self) -> impl Iterator<Item = &str> {
+        self.track.suspicions()
+    }
+
     /// What all particles share.
     pub fn graph(&self) -> &Graph {
         &self.filter.graph

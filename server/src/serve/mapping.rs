@@ -280,7 +280,7 @@ impl Mapping {
             Effect::EdgeAccepted { weight, reason, .. } => info!(map, weight, "{reason}"),
             Effect::Suspected { stamp_ns, why, .. } => {
                 warn!(map, stamp_ns, "{why}");
-                lock(&self.view.suspected).push(why);
+                *lock(&self.view.suspected) = suspicions(&self.fold);
             }
             Effect::SegmentBegan { stamp_ns, reason } => warn!(map, stamp_ns, "new segment: {reason}"),
             Effect::EdgeRefused { reason, .. } => debug!(map, "{reason}"),
@@ -304,6 +304,11 @@ impl Mapping {
         self.begin_save()?;
         self.saver.finish()
     }
+}
+
+/// What seems wrong with the senses of a map's robot.
+pub fn suspicions(fold: &Fold) -> Vec<String> {
+    fold.mapper.suspicions().map(str::to_owned).collect()
 }
 
 /// Bytes that something of a robot's or a guide's takes on its way to the filter.

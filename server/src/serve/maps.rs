@@ -1,6 +1,7 @@
 //! The maps there are: loads them at the start, makes new ones for robots, starts and stops their
 //! threads.
 
+use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
@@ -14,7 +15,7 @@ use toponym_proto::{Setup, Stamp};
 use tracing::{error, info, warn};
 
 use super::board::{Board, MapView, lock};
-use super::mapping::{Due, Mapping};
+use super::mapping::{Due, Mapping, suspicions};
 use super::outbox::Outbox;
 use super::recording::Recordings;
 use super::saver::Saver;
@@ -81,14 +82,23 @@ impl Maps {
 
     /// Starts a thread for each saved map. One that can't be loaded stops only itself.
     pub fn start_saved(&mut self) -> Result<(), StoreError> {
-        for (started, id) in self.store.ids()?.into_iter().enumerate() {
-            if started >= self.config.limits.maps {
-                warn!(map = id, "not loaded: there are {started} maps at hand, limits.maps");
-                self.show_retired(&id);
-                continue;
-            }
+        let mut ids = self.store.ids()?;
+        let room = self.config.limits.maps;
+        if ids.len() > room {
+            ids.sort_by_key(|id| Reverse(self.store.written_at(id)));
+        }
+        for (k, id) in ids.into_iter().enumerate() {
             let loaded = self.store.load(&id, self.hold()).map_err(|e| e.to_string());
-            if let Err(why) = loaded.and_then(|found| self.go_on(&id, found)) {
+            let begun = loaded.and_then(|found| {
+                if k < room {
+                    return self.go_on(&id, found);
+                }
+                warn!(map = id, "stays on disk: others were written to later, and limits.maps is {room}");
+                self.remember(&found.fold.card.robot, reached(&found.fold, &found.tail), None);
+                self.show_retired(&id);
+                Ok(())
+            });
+            if let Err(why) = begun {
                 error!(map = id, "this map is not served: {why}");
                 let problem = Problem::new(ErrorCode::Internal, format!("map {id:?} can't be loaded: {why}"))
                     .field("map")
@@ -114,22 +124,21 @@ impl Maps {
             warn!(map = id, "made by build {}; what follows its checkpoint is folded by this one", old.build);
         }
         *old = new;
-        let watermark = tail.iter().filter_map(|(_, entry)| entry.watermark()).max().max(fold.card.watermark);
-        // What has arrived, not what the filter has taken in: it may be far behind.
-        let stamp = |(_, entry): &(u64, Entry)| match &entry.event {
-            Event::Message(message) => Some(message.header()?.stamp),
-            _ => None,
-        };
-        let newest = tail.iter().rev().find_map(stamp).unwrap_or(Stamp { ns: fold.card.stamp_ns });
+        let reached = reached(&fold, &tail);
         info!(map = id, robot = fold.card.robot, entries = tail.len(), "loaded");
         let robot = fold.card.robot.clone();
-        let view = self.start(id, Start { fold, tail, journal }, watermark).map_err(|e| e.to_string())?;
-        if let Some(watermark) = watermark
-            && self.saved.get(&robot).is_none_or(|known| known.watermark <= watermark)
-        {
-            self.saved.insert(robot, Saved { map: Some(view), watermark, newest });
-        }
+        let view = self.start(id, Start { fold, tail, journal }, reached.0).map_err(|e| e.to_string())?;
+        self.remember(&robot, reached, Some(view));
         Ok(())
+    }
+
+    /// Keeps in mind how far a robot is, and on which map if that is at hand.
+    fn remember(&mut self, robot: &str, reached: (Option<(u64, u64)>, Stamp), map: Option<Arc<MapView>>) {
+        if let (Some(watermark), newest) = reached
+            && self.saved.get(robot).is_none_or(|known| known.watermark <= watermark)
+        {
+            self.saved.insert(robot.to_owned(), Saved { map, watermark, newest });
+        }
     }
 
     /// The robots that saved maps are of.
@@ -190,12 +199,8 @@ impl Maps {
     fn retire(&mut self, view: &MapView) {
         info!(map = view.id, idle_s = view.idle().as_secs(), "retired: another needs its room");
         self.end(view, STOP_WAIT);
-        if let Some(watermark) = *lock(&view.durable)
-            && self.saved.get(&view.robot).is_none_or(|known| known.watermark <= watermark)
-        {
-            let saved = Saved { map: None, watermark, newest: view.stamp() };
-            self.saved.insert(view.robot.clone(), saved);
-        }
+        let reached = (*lock(&view.durable), view.stamp());
+        self.remember(&view.robot, reached, None);
         let problem = self.show_retired(&view.id);
         self.newly_retired.push((view.id.clone(), problem));
     }
@@ -237,6 +242,7 @@ impl Maps {
         let (work, queue) = sync_channel(QUEUE);
         let (steps, taken) = sync_channel(STEPS);
         let view = Arc::new(MapView::new(id, &fold.card, durable, fold.mapper.snapshot(), work));
+        *lock(&view.suspected) = suspicions(&fold);
         let newest = tail.last().map_or(fold.now(), |(_, entry)| Duration::from_nanos(entry.at_ns));
         let held_ns = tail.iter().rev().find_map(|(_, entry)| match entry.event {
             Event::Hold(ns) => Some(ns),
@@ -331,6 +337,17 @@ impl Maps {
         }
         failed
     }
+}
+
+/// How far a map's robot is: (boot, seq) of the last of its messages on disk, and the newest stamp that has arrived, not
+/// what the filter has taken in: that may be far behind.
+fn reached(fold: &Fold, tail: &[(u64, Entry)]) -> (Option<(u64, u64)>, Stamp) {
+    let watermark = tail.iter().filter_map(|(_, entry)| entry.watermark()).max().max(fold.card.watermark);
+    let stamp = |(_, entry): &(u64, Entry)| match &entry.event {
+        Event::Message(message) => Some(message.header()?.stamp),
+        _ => None,
+    };
+    (watermark, tail.iter().rev().find_map(stamp).unwrap_or(Stamp { ns: fold.card.stamp_ns }))
 }
 
 fn taken(map: &str, robot: &str) -> Problem {

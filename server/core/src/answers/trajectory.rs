@@ -21,9 +21,9 @@ pub struct Keyframe {
 const UNLIKE: f64 = 0.02;
 
 /// Poses of odometry `rows` (in order of arrival) in the map: odometry since the keyframe before
-/// and back from the keyframe after, blended by odometry's path, or by rows if it hardly noticed the way. Keyframes are in order of arrival; those
-/// whose place is not in `places` are passed over. Before the first keyframe and after the last,
-/// the one that there is; with no keyframe at all, odometry itself.
+/// and back from the keyframe after, blended by odometry's path, or by rows if it hardly noticed the
+/// way. Keyframes are in order of arrival; those whose place is not in `places` are passed over. Before
+/// the first keyframe and after the last, the one that there is; with no keyframe at all, odometry itself.
 pub fn carry(rows: &[Pose2], keyframes: &[Keyframe], places: &BTreeMap<PlaceId, Pose2>) -> Vec<Pose2> {
     let known: Vec<(usize, Pose2, Pose2)> = keyframes
         .iter()

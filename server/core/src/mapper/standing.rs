@@ -24,7 +24,8 @@ use serde::{Deserialize, Serialize};
 const SURE: f64 = 0.95;
 /// … or more likely wrong.
 const LIKELY: f64 = 0.5;
-/// Share of what is near that is not, where wheels and scans contradict each other.
+/// Share of what is near that may not be, where wheels and scans contradict each other: one of them is wrong, and nobody
+/// knows which.
 const EITHER: f64 = 0.4;
 /// Reasons that weigh less than this share of the heaviest are not told.
 const WORTH_TELLING: f64 = 0.5;
@@ -102,22 +103,18 @@ impl Standing {
             near += kept * p.weight() * spread.near(off(filter, front, p, told));
             at_best += kept * p.weight() * spread.near([0.0; 3]);
         }
+        let contradiction = front.contradiction();
+        let either = if contradiction.is_some() { EITHER * near } else { 0.0 };
         let cause = match ways.first().and_then(|way| way.stretch(&vague)) {
+            _ if contradiction.is_some() => contradiction.unwrap_or_default(),
             _ if front.open_places().any(|p| p.chain.broken) => "odometry broke".to_owned(),
             _ if front.sees_nothing() => format!("in the dark for {:.0} m", front.unseen_m()),
             Some(stretch) if stretch.broken => "odometry broke".to_owned(),
             Some(stretch) => format!("nothing known seen since {:.0} m in the dark", stretch.path_m),
             None => "nothing known seen since it was dark".to_owned(),
         };
-        let (mut vague, split) = ((kept - at_best).max(0.0), (at_best - near).max(0.0));
-        let mut cause = cause;
-        if let Some(contradiction) = front.contradiction() {
-            // One of the two is wrong, and which one nobody knows.
-            vague += EITHER * near;
-            near *= 1.0 - EITHER;
-            cause = contradiction;
-        }
-        Doubt { near, vague, split, unresolved: filter.unresolved(), cause }
+        let (vague, split) = ((kept - at_best).max(0.0) + either, (at_best - near).max(0.0));
+        Doubt { near: near - either, vague, split, unresolved: filter.unresolved(), cause }
     }
 }
 

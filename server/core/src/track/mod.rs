@@ -22,7 +22,8 @@ use crate::track::looks::Looks;
 use crate::track::odometry::{Odometry, Step};
 use crate::track::places::FrozenPlace;
 use serde::{Deserialize, Serialize};
-use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::collections::btree_map::Entry;
+use std::collections::{BTreeMap, VecDeque};
 
 /// Scans that wait for odometry to bracket their sweep.
 const WAITING_MAX: usize = 64;
@@ -41,7 +42,7 @@ pub struct Track {
     /// Of each laser.
     looks: BTreeMap<String, Looks>,
     /// What was told of its senses.
-    suspected: BTreeSet<Suspicion>,
+    suspected: BTreeMap<Suspicion, String>,
 }
 
 /// A scan that waits for odometry.
@@ -75,7 +76,7 @@ impl Track {
             waiting: VecDeque::new(),
             scans: 0,
             looks: BTreeMap::new(),
-            suspected: BTreeSet::new(),
+            suspected: BTreeMap::new(),
         }
     }
 
@@ -104,10 +105,11 @@ impl Track {
             let (taken_ns, apart_ns) = looks.taken_ns(&scan, self.odometry.newest_ns());
             if let Some(apart_ns) = apart_ns {
                 let (s, laser) = (apart_ns as f64 * 1e-9, &scan.laser);
-                let why = format!(
-                    "stamps of laser {laser:?} are {s:.1} s behind odometry's: the newest odometry is used"
-                );
-                self.suspect(scan.stamp_ns, Suspicion::Clocks, why, effects);
+                let side = if s > 0.0 { "behind" } else { "ahead of" };
+                self.suspect(scan.stamp_ns, Suspicion::Clocks, effects, || {
+                    let s = s.abs();
+                    format!("stamps of laser {laser:?} are {s:.1} s {side} odometry's: the newest odometry is used")
+                });
             }
             self.waiting.push_back(Waiting { scan, taken_ns });
         } else {
@@ -164,36 +166,51 @@ impl Track {
         let is_blind = looks.is_blind(seen.points.len(), odom);
         if is_frozen {
             seen.points.clear();
-            let why = format!("laser {laser:?} repeats one scan, bit by bit, while the robot drives");
-            self.suspect(scan.stamp_ns, Suspicion::Frozen, why, effects);
+            self.suspect(scan.stamp_ns, Suspicion::Frozen, effects, || {
+                format!("laser {laser:?} repeats one scan, bit by bit, while the robot drives")
+            });
         } else if is_blind {
-            let beyond =
-                scan.ranges_m.iter().copied().filter(|r| r.is_finite() && f64::from(*r) > range_max_m);
-            let nearest_m = beyond.fold(f32::INFINITY, f32::min);
-            let units = if nearest_m.is_finite() && f64::from(nearest_m) > 2.0 * range_max_m {
-                format!("; the nearest is at {nearest_m:.0} m: are they millimetres?")
-            } else {
-                String::new()
-            };
-            let why = format!("laser {laser:?} sees nothing within its range of {range_max_m} m{units}");
-            self.suspect(scan.stamp_ns, Suspicion::Blind, why, effects);
+            self.suspect(scan.stamp_ns, Suspicion::Blind, effects, || {
+                let finite = scan.ranges_m.iter().copied().filter(|r| r.is_finite());
+                let nearest_m = finite.fold(f32::INFINITY, f32::min);
+                let units = if nearest_m.is_finite() && f64::from(nearest_m) > 2.0 * range_max_m {
+                    format!("; the nearest is at {nearest_m:.0} m: are they millimetres?")
+                } else {
+                    String::new()
+                };
+                format!("laser {laser:?} sees nothing within its range of {range_max_m} m{units}")
+            });
         }
     }
 
     /// Whether scans and wheels agree in the long run.
     fn compare(&mut self, stamp_ns: StampNs, effects: &mut Effects) {
         if self.front.wheels_stand_still() {
-            let why = "odometry stands still while scans move: they alone tell the way".to_owned();
-            self.suspect(stamp_ns, Suspicion::Still, why, effects);
+            self.suspect(stamp_ns, Suspicion::Still, effects, || {
+                "odometry stands still while scans move: they alone tell the way".to_owned()
+            });
         } else if let Some(why) = self.front.contradiction() {
-            self.suspect(stamp_ns, Suspicion::Contradiction, why, effects);
+            self.suspect(stamp_ns, Suspicion::Contradiction, effects, || why);
         }
     }
 
-    fn suspect(&mut self, stamp_ns: StampNs, what: Suspicion, why: String, effects: &mut Effects) {
-        if self.suspected.insert(what) {
+    /// Tells of each kind once.
+    fn suspect(
+        &mut self,
+        stamp_ns: StampNs,
+        what: Suspicion,
+        effects: &mut Effects,
+        why: impl FnOnce() -> String,
+    ) {
+        if let Entry::Vacant(entry) = self.suspected.entry(what) {
+            let why = entry.insert(why()).clone();
             effects.push(Effect::Suspected { stamp_ns, what, why });
         }
+    }
+
+    /// What was told of the robot's senses.
+    pub fn suspicions(&self) -> impl Iterator<Item = &str> {
+        self.suspected.values().map(String::as_str)
     }
 }
 

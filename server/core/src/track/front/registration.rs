@@ -94,7 +94,8 @@ impl FrontEnd {
             found = reached.filter(as_good).or(found);
         }
         if found.is_some_and(|f| f.inlier_share < self.usual_share - LESS) {
-            let rival = self.freely(&points, &self.front_from_body.clone());
+            let near = self.front_from_body;
+            let rival = self.freely(&points, &near);
             let better = |r: &Alignment| found.is_none_or(|f| r.inlier_share >= f.inlier_share + MORE);
             found = rival.filter(|r| better(r) && stood.reaches(&r.target_from_source)).or(found);
         }

@@ -9,8 +9,8 @@
 //! ```
 //!
 //! with S the variances of both together, W what robots can do meanwhile (who slips ahead need not turn), filtered forwards. While they are more likely wrong than right, the robot is
-//! thought to go on as scans last saw it move. Scans that see nothing say nothing: then what is known decays
-//! towards how often wheels are wrong at all.
+//! thought to go on as scans last saw it move. Scans that see nothing say nothing: then what is known of
+//! wheels that move decays towards how often they are wrong at all.
 
 use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
