@@ -139,7 +139,13 @@ fn fuzz_damaged_journals() {
                 return false;
             };
             let index = opened.checkpoint.index as usize;
-            assert_eq!(written(&opened.tail), all[index..], "{name}: what was durable is there");
+            let (left, durable) = (written(&opened.tail), &all[index..]);
+            if opened.mended.iter().any(|told| told.contains("marks of what is durable is lost;")) {
+                // A mark and, by a second damage, all of the last entries: no file tells that from a stop before them.
+                assert!(durable.starts_with(&left), "{name}: what is left is what was durable");
+            } else {
+                assert_eq!(left, durable, "{name}: what was durable is there");
+            }
             goes_on(opened, &medium);
             true
         },

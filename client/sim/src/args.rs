@@ -70,9 +70,13 @@ pub struct SimulateArgs {
     /// People walking about, whose legs the laser sees; the first is the guide, ahead of the robot.
     #[arg(long, default_value_t = 0, value_name = "N")]
     pub people: usize,
-    /// What goes wrong: slip:DEGREES or slip:METRESm (the wheels count a turn or a way that the
-    /// robot does not make), unsigned (encoders without sign), break (silence, then the odometry
-    /// restarts at 0). May be given more than once; truth.json tells when it happened.
+    /// What goes wrong; may be given more than once, and truth.json tells when it happened.
+    ///
+    /// Wheels: slip:DEGREES or slip:METRESm (they count a turn or a way that the robot does not make), unsigned (encoders
+    /// without sign), constant, scale:TIMES, bias:DEGREES (per metre), jitter:METRES, stale:N (measured at each N-th
+    /// message only), pushed:METRES (they stand still meanwhile), carried (scans stop, too), break (silence, then
+    /// odometry restarts at 0). Lasers: clock:SECONDS (behind), frozen:SECONDS, mirrored and backwards (mounted so, and not
+    /// declared), millimetres. The building: glass:SHARE, dark:SHARE (of the walls), crowd:PEOPLE.
     #[arg(long = "fault", value_name = "FAULT")]
     pub faults: Vec<Fault>,
 }

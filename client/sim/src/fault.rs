@@ -1,13 +1,16 @@
-//! What wheels get wrong beyond noise, and what their reader does.
+//! What goes wrong with a robot's senses: what happens, and when. What wheels make of it is in `fault/wheels.rs`, what
+//! lasers do in `fault/senses.rs`.
+
+pub(crate) mod senses;
+pub(crate) mod wheels;
 
 use super::SimError;
 use super::body::STEP_S;
-use super::geom::{between, compose};
+use super::geom::between;
 use super::random::Draw;
 use super::robot::Drive;
 use std::fmt;
 use std::str::FromStr;
-use toponym_proto::Pose;
 
 /// A slipping robot's wheels turn it this fast.
 const SLIP_RADPS: f64 = 1.2;
@@ -15,8 +18,8 @@ const SLIP_RADPS: f64 = 1.2;
 const SLIP_MPS: f64 = 0.8;
 /// Silences take between these, seconds.
 const SILENCE_S: (f64, f64) = (3.0, 20.0);
-/// Distance of the wheels, metres.
-const TRACK_M: f64 = 0.4;
+/// So does being carried, the laser covered.
+const CARRIED_S: (f64, f64) = (5.0, 15.0);
 /// Faults begin in this part of the drive.
 const MIDST: (f64, f64) = (0.25, 0.75);
 
@@ -39,6 +42,66 @@ pub enum Fault {
     /// Nothing is sent for some seconds while the robot drives on, then the odometry restarts at 0;
     /// same boot.
     Break,
+    /// Somebody carries the robot on for some seconds: wheels stand still, scans are not sent.
+    Carried,
+    /// Somebody pushes it with its wheels off the floor: they stand still, the lasers see it all.
+    Pushed {
+        /// How far.
+        way_m: f64,
+    },
+    /// Odometry is measured at each so-many-th message only, and repeated in between.
+    Stale {
+        /// At least 2.
+        every: u32,
+    },
+    /// Wheels that never move.
+    Constant,
+    /// Odometry trembles, at rest, too.
+    Jitter {
+        /// Standard deviation of x and y; the heading's is a tenth of it in radians.
+        metres: f64,
+    },
+    /// Distances are read so many times too long.
+    Scale {
+        /// 1: as they are.
+        by: f64,
+    },
+    /// The wheels turn to the left as they roll.
+    Bias {
+        /// Per metre.
+        rad_per_m: f64,
+    },
+    /// The lasers' clock is behind the wheels'.
+    Clock {
+        /// By so much; ahead if less than 0.
+        behind_s: f64,
+    },
+    /// So many of the walls are of glass.
+    Glass {
+        /// Of one.
+        share: f64,
+    },
+    /// So many of the walls send light back from near by only.
+    Dark {
+        /// Of one.
+        share: f64,
+    },
+    /// People walk about, the first of them ahead of the robot.
+    Crowd {
+        /// How many.
+        people: usize,
+    },
+    /// A driver repeats a scan, bit by bit.
+    Frozen {
+        /// For how long.
+        lasts_s: f64,
+    },
+    /// Lasers hang head down, and setup does not say so.
+    Mirrored,
+    /// They look backwards, and setup does not say so.
+    Backwards,
+    /// Ranges are in millimetres.
+    Millimetres,
 }
 
 /// A fault and when it happened.
@@ -52,6 +115,13 @@ pub struct Incident {
     pub to_s: f64,
 }
 
+impl Incident {
+    /// Whether it is going on.
+    pub(crate) fn at(&self, t_s: f64) -> bool {
+        (self.from_s..self.to_s).contains(&t_s)
+    }
+}
+
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
@@ -59,6 +129,21 @@ impl fmt::Display for Fault {
             Self::SlipAhead { way_m } => write!(f, "slip:{way_m}m"),
             Self::Unsigned => write!(f, "unsigned"),
             Self::Break => write!(f, "break"),
+            Self::Carried => write!(f, "carried"),
+            Self::Pushed { way_m } => write!(f, "pushed:{way_m}"),
+            Self::Stale { every } => write!(f, "stale:{every}"),
+            Self::Constant => write!(f, "constant"),
+            Self::Jitter { metres } => write!(f, "jitter:{metres}"),
+            Self::Scale { by } => write!(f, "scale:{by}"),
+            Self::Bias { rad_per_m } => write!(f, "bias:{}", rad_per_m.to_degrees()),
+            Self::Clock { behind_s } => write!(f, "clock:{behind_s}"),
+            Self::Glass { share } => write!(f, "glass:{share}"),
+            Self::Dark { share } => write!(f, "dark:{share}"),
+            Self::Crowd { people } => write!(f, "crowd:{people}"),
+            Self::Frozen { lasts_s } => write!(f, "frozen:{lasts_s}"),
+            Self::Mirrored => write!(f, "mirrored"),
+            Self::Backwards => write!(f, "backwards"),
+            Self::Millimetres => write!(f, "millimetres"),
         }
     }
 }
@@ -66,34 +151,81 @@ impl fmt::Display for Fault {
 impl FromStr for Fault {
     type Err = SimError;
 
-    /// `slip:90` (degrees), `slip:3m` (metres), `unsigned`, `break`.
+    /// `slip:90` (degrees), `slip:3m` (metres), `unsigned`, …: [`Fault::NAMES`].
     fn from_str(text: &str) -> Result<Self, SimError> {
-        let unknown = || SimError::NoSuchFault(text.to_owned());
-        let finite = |v: &str| v.parse::<f64>().ok().filter(|v| v.is_finite()).ok_or_else(unknown);
-        match text.split_once(':') {
-            None if text == "unsigned" => Ok(Self::Unsigned),
-            None if text == "break" => Ok(Self::Break),
-            Some(("slip", value)) => match value.strip_suffix('m') {
-                Some(metres) => Ok(Self::SlipAhead { way_m: finite(metres)? }),
-                None => Ok(Self::SlipTurn { turn_rad: finite(value)?.to_radians() }),
+        let unknown = || SimError::NoSuchFault(text.to_owned(), Self::NAMES.to_owned());
+        let (name, value) = text.split_once(':').map_or((text, None), |(name, value)| (name, Some(value)));
+        let number = |usual: f64, may: std::ops::RangeInclusive<f64>| match value {
+            None => Ok(usual),
+            Some(value) => value.parse().ok().filter(|v| may.contains(v)).ok_or_else(unknown),
+        };
+        let one = 0.0..=1.0;
+        Ok(match name {
+            "slip" => match value.ok_or_else(unknown)?.strip_suffix('m') {
+                Some(metres) => {
+                    let way_m: f64 =
+                        metres.parse().ok().filter(|m: &f64| m.is_finite()).ok_or_else(unknown)?;
+                    Self::SlipAhead { way_m }
+                }
+                None => Self::SlipTurn { turn_rad: number(0.0, -1e4..=1e4)?.to_radians() },
             },
-            _ => Err(unknown()),
-        }
+            "pushed" => Self::Pushed { way_m: number(2.0, 0.1..=100.0)? },
+            "stale" => Self::Stale { every: number(5.0, 2.0..=1000.0)? as u32 },
+            "jitter" => Self::Jitter { metres: number(0.005, 0.0..=1.0)? },
+            "scale" => Self::Scale { by: number(0.9, -10.0..=10.0)? },
+            "bias" => Self::Bias { rad_per_m: number(1.0, -90.0..=90.0)?.to_radians() },
+            "clock" => Self::Clock { behind_s: number(3600.0, -1e6..=1e6)? },
+            "glass" => Self::Glass { share: number(0.3, one)? },
+            "dark" => Self::Dark { share: number(0.3, one)? },
+            "crowd" => Self::Crowd { people: number(12.0, 1.0..=100.0)? as usize },
+            "frozen" => Self::Frozen { lasts_s: number(20.0, 0.1..=1e4)? },
+            _ if value.is_some() => return Err(unknown()),
+            "unsigned" => Self::Unsigned,
+            "break" => Self::Break,
+            "carried" => Self::Carried,
+            "constant" => Self::Constant,
+            "mirrored" => Self::Mirrored,
+            "backwards" => Self::Backwards,
+            "millimetres" => Self::Millimetres,
+            _ => return Err(unknown()),
+        })
     }
 }
 
-/// Draws when each fault happens: in the midst of the drive, with the robot under way.
-pub(crate) fn incidents(faults: &[Fault], drive: &Drive, draw: &mut Draw) -> Vec<Incident> {
-    let mut happen = |fault: &Fault| {
-        let lasts_s = match fault {
-            Fault::SlipTurn { turn_rad } => turn_rad.abs() / SLIP_RADPS,
-            Fault::SlipAhead { way_m } => way_m.abs() / SLIP_MPS,
-            Fault::Unsigned => {
-                return Incident { fault: *fault, from_s: 0.0, to_s: drive.duration_s() };
+impl Fault {
+    /// How faults are written, with what they are worth where that may be left out.
+    pub const NAMES: &str = "slip:DEGREES, slip:METRESm, unsigned, break, carried, pushed:METRES (2), stale:N (5), constant, \
+        jitter:METRES (.005), scale:TIMES (.9), bias:DEGREES (1, per metre), clock:SECONDS (3600), glass:SHARE (.3), \
+        dark:SHARE (.3), crowd:PEOPLE (12), frozen:SECONDS (20), mirrored, backwards, millimetres";
+
+    /// How long it lasts once it begins at a time; none: all along.
+    fn lasts_s(&self, from_s: f64, drive: &Drive, draw: &mut Draw) -> Option<f64> {
+        Some(match *self {
+            Self::SlipTurn { turn_rad } => turn_rad.abs() / SLIP_RADPS,
+            Self::SlipAhead { way_m } => way_m.abs() / SLIP_MPS,
+            Self::Break => draw.within(SILENCE_S),
+            Self::Carried => draw.within(CARRIED_S),
+            Self::Frozen { lasts_s } => lasts_s,
+            Self::Pushed { way_m } => {
+                let first = (from_s / STEP_S) as usize;
+                let steps = drive.poses.windows(2).skip(first);
+                let mut left_m = way_m;
+                let pushed = steps.take_while(|w| {
+                    let step = between(&w[0], &w[1]);
+                    left_m -= step.x_m.hypot(step.y_m);
+                    left_m > 0.0
+                });
+                pushed.count() as f64 * STEP_S
             }
-            Fault::Break => draw.within(SILENCE_S),
+            _ => return None,
+        })
+    }
+
+    fn happens(&self, drive: &Drive, draw: &mut Draw) -> Incident {
+        // Drawn first: when it happens depends on how long it lasts for none.
+        let Some(lasts_s) = self.lasts_s(0.0, drive, draw) else {
+            return Incident { fault: *self, from_s: 0.0, to_s: f64::INFINITY };
         };
-        let steps = (lasts_s / STEP_S).round().max(1.0);
         let mut from_s = 0.0;
         for _ in 0..50 {
             from_s = (draw.within(MIDST) * drive.duration_s() / STEP_S).round() * STEP_S;
@@ -102,51 +234,32 @@ pub(crate) fn incidents(faults: &[Fault], drive: &Drive, draw: &mut Draw) -> Vec
                 break;
             }
         }
-        Incident { fault: *fault, from_s, to_s: from_s + steps * STEP_S }
-    };
-    faults.iter().map(&mut happen).collect()
+        let lasts_s = match self {
+            Self::Pushed { .. } => self.lasts_s(from_s, drive, draw).unwrap_or(lasts_s),
+            _ => lasts_s,
+        };
+        let steps = (lasts_s / STEP_S).round().max(1.0);
+        Incident { fault: *self, from_s, to_s: from_s + steps * STEP_S }
+    }
+}
+
+/// Draws when each fault happens: in the midst of the drive, with the robot under way.
+pub(crate) fn incidents(faults: &[Fault], drive: &Drive, draw: &mut Draw) -> Vec<Incident> {
+    let all_along = |i: Incident| Incident { to_s: i.to_s.min(drive.duration_s()), ..i };
+    faults.iter().map(|fault| all_along(fault.happens(drive, draw))).collect()
 }
 
 /// Whether the robot sends nothing at a time.
 pub(crate) fn silent(incidents: &[Incident], t_s: f64) -> bool {
-    incidents.iter().any(|i| i.fault == Fault::Break && (i.from_s..i.to_s).contains(&t_s))
-}
-
-/// What `read` (what the wheels measured of the motion `drive`) becomes by the faults.
-pub(crate) fn misread(incidents: &[Incident], drive: &Drive, read: &Drive) -> Drive {
-    let mut at = Pose::default();
-    let mut poses = vec![at];
-    for (k, (moved, read)) in drive.poses.windows(2).zip(read.poses.windows(2)).enumerate() {
-        let mut step = between(&read[0], &read[1]);
-        for incident in incidents {
-            let [first, end] = [incident.from_s, incident.to_s].map(|t_s| (t_s / STEP_S).round() as usize);
-            let share = if (first..end).contains(&k) { 1.0 / (end - first) as f64 } else { 0.0 };
-            match incident.fault {
-                Fault::SlipTurn { turn_rad } => step.yaw_rad += share * turn_rad,
-                Fault::SlipAhead { way_m } => step.x_m += share * way_m,
-                Fault::Unsigned => step = unsigned(&step, &between(&moved[0], &moved[1])),
-                Fault::Break if k == end => at = Pose::default(),
-                Fault::Break => {}
-            }
-        }
-        at = compose(&at, &step);
-        poses.push(at);
-    }
-    Drive { poses }
-}
-
-/// A step as wheels count it that know no sign.
-fn unsigned(read: &Pose, moved: &Pose) -> Pose {
-    let wheels = |step: &Pose| [-1.0, 1.0].map(|side| step.x_m + side * step.yaw_rad * TRACK_M / 2.0);
-    let (read, moved) = (wheels(read), wheels(moved));
-    let [left, right] = [0, 1].map(|k| if moved[k] < 0.0 { -read[k] } else { read[k] });
-    Pose { x_m: f64::midpoint(left, right), y_m: 0.0, yaw_rad: (right - left) / TRACK_M }
+    incidents.iter().any(|i| i.fault == Fault::Break && i.at(t_s))
 }
 
 #[cfg(test)]
 mod tests {
+    use super::wheels::misread;
     use super::*;
     use crate::geom::wrap;
+    use toponym_proto::Pose;
 
     /// 40 s ahead at 1 m/s, with a turn of a radian on the spot in the end.
     fn drive() -> Drive {
@@ -177,7 +290,7 @@ mod tests {
     fn without_sign_a_turn_on_the_spot_reads_as_straight_on() {
         let (_, read) = end(Fault::Unsigned);
         let spot = between(&read.at(40.0), &read.at(41.0));
-        assert!(spot.yaw_rad.abs() < 1e-9 && (spot.x_m - TRACK_M / 2.0).abs() < 1e-9, "{spot:?}");
+        assert!(spot.yaw_rad.abs() < 1e-9 && (spot.x_m - 0.2).abs() < 1e-9, "{spot:?}");
         assert!((read.at(40.0).x_m - 40.0).abs() < 1e-9, "ahead is ahead");
     }
 
@@ -193,10 +306,34 @@ mod tests {
 
     #[test]
     fn names_are_read_and_others_refused() {
-        for name in ["slip:90", "slip:-45", "slip:3m", "unsigned", "break"] {
+        for name in [
+            "slip:90",
+            "slip:-45",
+            "slip:3m",
+            "unsigned",
+            "break",
+            "carried",
+            "pushed:2",
+            "stale:5",
+            "constant",
+            "jitter:0.005",
+            "scale:0.9",
+            "bias:1",
+            "clock:3600",
+            "clock:-2",
+            "glass:0.3",
+            "dark:0.3",
+            "crowd:12",
+            "frozen:20",
+            "mirrored",
+            "backwards",
+            "millimetres",
+        ] {
             assert_eq!(name.parse::<Fault>().unwrap().to_string(), name);
         }
-        for name in ["slip", "slip:x", "slip:infm", "smoke", "break:3"] {
+        for name in
+            ["slip", "slip:x", "slip:infm", "smoke", "break:3", "stale:1", "glass:2", "crowd:0", "bias:nan"]
+        {
             assert!(name.parse::<Fault>().is_err(), "{name}");
         }
     }

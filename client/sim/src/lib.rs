@@ -47,6 +47,8 @@ pub use storey::Storey;
 pub use wheels::{Wheels, WheelsPrior};
 pub use world::{Plan, Room, RoomKind, Surface, World};
 
+use fault::senses;
+use fault::wheels::misread;
 use geom::Point;
 use toponym_proto::merge::{Sentences, order_stamp};
 use toponym_proto::{Clock, End, Header, Message, Odom, Pose, Say, Scan, Setup, Stamp};
@@ -55,6 +57,10 @@ use toponym_proto::{Clock, End, Header, Message, Odom, Pose, Say, Scan, Setup, S
 const PEOPLE: u64 = 1000;
 /// Purpose of the draws of when faults happen.
 const FAULTS: u64 = 1001;
+/// Of which walls are of glass, or dark.
+const SURFACES: u64 = 1002;
+/// Of how odometry trembles.
+const JITTER: u64 = 1003;
 
 /// A scenario that can't be played.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -69,8 +75,8 @@ pub enum SimError {
     #[error("a tour needs 2 rooms, the largest part that doors join has {0}: do portals face each other?")]
     TooSmall(usize),
     /// A fault of that name is not known.
-    #[error("{0:?} is no fault: give slip:DEGREES, slip:METRESm, unsigned or break")]
-    NoSuchFault(String),
+    #[error("{0:?} is no fault: give {1}")]
+    NoSuchFault(String, String),
     /// A tour of that name is not known.
     #[error("there is no tour {0:?}: give one of {1}")]
     NoSuchTour(String, String),
@@ -154,21 +160,34 @@ impl Scenario {
     pub(crate) fn stream(&self, drive: &Drive) -> Result<Stream, SimError> {
         let incidents = fault::incidents(&self.faults, drive, &mut self.draw(FAULTS));
         let odometry = drive.measured(&self.wheels, &mut self.draw(1));
-        let odometry = fault::misread(&incidents, drive, &odometry);
-        let people = People::walking(&self.world, drive, self.people, &mut self.draw(PEOPLE))?;
-        let scene = Scene { world: &self.world, drive, people: &people };
+        let odometry = misread(&incidents, drive, &odometry);
+        let world = senses::building(&self.world, &self.faults, &mut self.draw(SURFACES));
+        let people = senses::people(&self.faults, self.people);
+        let people = People::walking(&self.world, drive, people, &mut self.draw(PEOPLE))?;
+        let scene = Scene { world: &world, drive, people: &people };
         let told = |t_s: &f64| !fault::silent(&incidents, *t_s);
         let mut timed = vec![(0.0, self.setup())];
-        for t_s in ticks(drive.duration_s(), self.odom_rate_hz).filter(told) {
-            timed.push((t_s, self.odom(t_s, &odometry)));
+        let mut trembles = self.draw(JITTER);
+        for (k, t_s) in ticks(drive.duration_s(), self.odom_rate_hz).enumerate() {
+            let pose = fault::wheels::told(&incidents, &odometry, k, self.odom_rate_hz, &mut trembles);
+            if told(&t_s) {
+                timed.push((t_s, Message::Odom(Odom { header: self.header(t_s), odom_from_body: pose })));
+            }
         }
         let mut scans = Vec::new();
         for (laser, purpose) in self.lasers.iter().zip(3..) {
             let mut draw = self.draw(purpose);
+            let (sees, mut last) = (senses::mounted(&self.faults, laser), None);
             for t_s in ticks(drive.duration_s() - laser.sweep_s, laser.rate_hz).filter(told) {
+                let sweep = sees.sweep(&scene, t_s, &mut draw);
+                if senses::covered(&incidents, t_s) {
+                    continue;
+                }
+                let sweep = senses::sent(&incidents, t_s, sweep, last.as_ref());
                 // A sweep is sent when it is complete.
-                timed.push((t_s + laser.sweep_s, self.scan(t_s, laser, &scene, &mut draw)));
-                scans.push((Stamp::from_seconds(t_s), drive.at(t_s)));
+                timed.push((t_s + laser.sweep_s, self.scan(t_s, laser, &sweep)));
+                last = Some(sweep);
+                scans.push((senses::stamped(&self.faults, Stamp::from_seconds(t_s)), drive.at(t_s)));
             }
         }
         scans.sort_by_key(|s| s.0);
@@ -189,19 +208,15 @@ impl Scenario {
         Message::Setup(Setup { header: self.header(0.0), map: self.map.clone(), lasers })
     }
 
-    fn odom(&self, t_s: f64, odometry: &Drive) -> Message {
-        Message::Odom(Odom { header: self.header(t_s), odom_from_body: odometry.at(t_s) })
-    }
-
-    fn scan(&self, t_s: f64, laser: &LaserModel, scene: &Scene<'_>, draw: &mut Draw) -> Message {
-        let sweep = laser.sweep(scene, t_s, draw);
+    fn scan(&self, t_s: f64, laser: &LaserModel, sweep: &Sweep) -> Message {
+        let header = self.header(t_s);
         Message::Scan(Scan {
-            header: self.header(t_s),
+            header: Header { stamp: senses::stamped(&self.faults, header.stamp), ..header },
             laser: laser.mount.id.clone(),
             angle_min_rad: laser.angle_min_rad(),
             angle_increment_rad: sweep.angle_increment_rad,
             time_increment_s: sweep.time_increment_s,
-            ranges_m: sweep.ranges_m,
+            ranges_m: sweep.ranges_m.clone(),
         })
     }
 

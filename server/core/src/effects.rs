@@ -31,8 +31,12 @@ pub enum Suspicion {
     Clocks,
     /// A laser repeats one scan while the robot moves.
     Frozen,
+    /// A laser's ranges are taken for millimetres.
+    Millimetres,
     /// A laser has seen nothing within its range for some metres.
     Blind,
+    /// Odometry repeats each pose until there is a newer one.
+    Stale,
     /// Odometry stands still while scans move.
     Still,
     /// Scans and wheels contradict each other in the long run.

@@ -6,6 +6,7 @@
 //! cargo run --release -p toponym-server --example drives -- coverage drives/*
 //! cargo run --release -p toponym-server --example drives -- dark --seeds 20
 //! cargo run --release -p toponym-server --example drives -- absence --seeds 20
+//! cargo run --release -p toponym-server --example drives -- faults --seeds 200 --plans PLANS
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
 //! shows on buildings not learned from how often fits are true that are called so with some probability.
@@ -22,6 +23,7 @@ mod chance;
 mod coverage;
 mod dark;
 mod drive;
+mod faults;
 mod logistic;
 
 use clap::{Parser, Subcommand};
@@ -57,6 +59,24 @@ enum What {
         #[arg(long, default_value_t = 20)]
         seeds: u64,
     },
+    /// Whether maps are right, or told, where something goes wrong with the robot's senses.
+    Faults {
+        /// Folder with floor plans (XML of the KTH campus data set); none: random offices.
+        #[arg(long)]
+        plans: Option<PathBuf>,
+        /// The first seed.
+        #[arg(long, default_value_t = 1)]
+        from: u64,
+        /// How many.
+        #[arg(long, default_value_t = 200)]
+        seeds: u64,
+        /// Only this kind, as the list in the source has it.
+        #[arg(long)]
+        only: Option<String>,
+        /// Nothing goes wrong: counts false alarms.
+        #[arg(long)]
+        clean: bool,
+    },
     /// Errors of the chain over dark stretches, and what it claims.
     Dark {
         /// Kinds of tours, or how they begin; none: all of them.
@@ -77,6 +97,9 @@ fn main() {
             chance::report(&drives);
         }
         What::Coverage { drives } => drives.iter().for_each(|d| coverage::report(&Drive::read(d))),
+        What::Faults { plans, from, seeds, only, clean } => {
+            faults::report(plans.as_deref(), from..from + seeds, only.as_deref(), clean);
+        }
         What::Absence { seeds } => absence::report(1001..1001 + seeds),
         What::Dark { kinds, seeds, each } => dark::report(&kinds, 1..seeds + 1, each),
     }

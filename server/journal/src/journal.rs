@@ -233,7 +233,10 @@ fn whole_entries(
                 "one of two marks of what is durable is damaged: more may have been durable than is left";
             return Err(JournalError::damaged(&segment.name, segment::SLOTS_AT[0], why));
         }
-        mended.push(format!("{}: one of two marks of what is durable is lost", segment.name));
+        mended.push(format!(
+            "{}: one of two marks of what is durable is lost; if the medium lost more, entries from {there} on are missing",
+            segment.name
+        ));
     }
     if let (Some((offset, why)), None) = (&segment.broken, next) {
         mended.push(format!(

@@ -9,7 +9,8 @@
 //! ```
 //! A commit syncs its entries, then writes the slot that is not the newest, and syncs that: what a
 //! slot says is durable, is; and if one is torn or lost, the other one still holds, as long as the entries bear out that
-//! the lost one told of no more than is there. Format 1 is read; its slots do not say which they are.
+//! the lost one told of no more than is there. (A slot lost *and* the whole of the last entries zeroed looks like a stop
+//! before them: that is opened, and told as mended.) Format 1 is read; its slots do not say which they are.
 
 use crate::{Disk, DiskFile, Identity, JournalError};
 use std::ops::Range;

@@ -31,7 +31,7 @@ impl Point {
     }
 
     /// The same with the sine and cosine of the turn at hand.
-    pub(super) fn turned(&self, by: &Pose2, s: f64, c: f64) -> Self {
+    pub(crate) fn turned(&self, by: &Pose2, s: f64, c: f64) -> Self {
         let (x, y) = (f64::from(self.x), f64::from(self.y));
         let (nx, ny) = (f64::from(self.nx), f64::from(self.ny));
         Self {

@@ -22,4 +22,4 @@ pub mod sweep;
 #[cfg(test)]
 pub(crate) mod tests;
 pub mod view;
-mod weak;
+pub(crate) mod weak;

@@ -13,19 +13,19 @@ const NORMAL_NOISE: f64 = 0.35;
 
 /// A direction of translation of which the pairs say little, source's frame.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Weak {
+pub(crate) struct Weak {
     /// Unit.
-    pub(super) x: f64,
-    pub(super) y: f64,
+    pub(crate) x: f64,
+    pub(crate) y: f64,
     /// How weak it is, 0 … 1.
-    pub(super) share: f64,
+    pub(crate) share: f64,
     /// Square of the component along it that noise may give a normal.
     noise2: f64,
 }
 
 impl Weak {
     /// The least known direction of translation, if it is known far less than the one across it.
-    pub(super) fn of(information: &Matrix3<f64>) -> Option<Self> {
+    pub(crate) fn of(information: &Matrix3<f64>) -> Option<Self> {
         let (xx, xy, yy) = (information[(0, 0)], information[(0, 1)], information[(1, 1)]);
         let (mean, half) = (f64::midpoint(xx, yy), (0.5 * (xx - yy)).hypot(xy));
         let share = (mean - half) / (mean + half);
@@ -36,7 +36,7 @@ impl Weak {
     }
 
     /// A unit normal less what noise may have given it along the direction; unit again.
-    pub(super) fn denoised(&self, (a, b): (f64, f64)) -> (f64, f64) {
+    pub(crate) fn denoised(&self, (a, b): (f64, f64)) -> (f64, f64) {
         let (along, across) = (a * self.x + b * self.y, b * self.x - a * self.y);
         let kept = along * (1.0 - self.noise2 / (along * along).max(self.noise2));
         let rest = (1.0 - kept * kept).max(0.0).sqrt().copysign(across);
@@ -44,7 +44,7 @@ impl Weak {
     }
 
     /// A normal less its component along the direction, the more the weaker that is.
-    pub(super) fn damped(&self, (a, b): (f64, f64)) -> (f64, f64) {
+    pub(crate) fn damped(&self, (a, b): (f64, f64)) -> (f64, f64) {
         let off = (a * self.x + b * self.y) * self.share;
         (a - off * self.x, b - off * self.y)
     }

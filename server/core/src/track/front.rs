@@ -6,6 +6,7 @@
 //! calibrated meanwhile (`track/wheels.rs`), and carries the robot over stretches where the laser
 //! sees nothing; the local maps on both sides are then tied as a whole (`front/bridge.rs`).
 
+use self::anew::is_still;
 use self::bridge::Dark;
 use self::contrast::Contrast;
 use self::registration::Stood;
@@ -47,6 +48,9 @@ const UNSEEN_SHARE: f64 = 0.5;
 /// (example `drives` of the server), and a real log, where it just covers: clutter errs more than noise does.
 const BEND: Vector3<f64> = Vector3::new(0.2, 0.2, 0.05);
 
+/// How fast the usual time from scan to scan is learned; longer ones are gaps.
+const PERIOD_GAIN: f64 = 0.05;
+const PERIOD_MAX_S: f64 = 2.0;
 /// φ of a stretch of which nothing speaks: one in ten kilometres.
 const FAILED_MIN: f64 = 1e-4;
 
@@ -69,6 +73,8 @@ pub struct FrontEnd {
     odom_from_body: Option<Pose2>,
     /// Of the newest scan.
     stamp_ns: StampNs,
+    /// Usual time from scan to scan.
+    period_s: f64,
     path_m: f64,
     /// Where the last stride ended.
     stride_from: Pose2,
@@ -108,6 +114,7 @@ impl FrontEnd {
             front_from_body: Pose2::default(),
             odom_from_body: None,
             stamp_ns: 0,
+            period_s: 0.0,
             path_m: 0.0,
             stride_from: Pose2::default(),
             wheels: Wheels::default(),
@@ -183,14 +190,19 @@ impl FrontEnd {
         let blind = sweep.points.len() < SEEN_MIN;
         if std::mem::take(&mut self.broken) {
             let carried = stamp_ns.saturating_sub(self.stamp_ns).saturating_abs() > CARRIED_NS;
-            if carried || !self.resume(&sweep) {
+            let dt_s = self.since_s(stamp_ns);
+            let stood = self.stands(dt_s);
+            if carried || !self.resume(&sweep, &stood) {
                 frozen = self.start_over();
             }
         } else if let Some(before) = self.odom_from_body {
-            let dt_s = stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9;
-            let stood = self.predict(&before.between(&odom_from_body), dt_s);
+            let dt_s = self.since_s(stamp_ns);
+            let increment = before.between(&odom_from_body);
+            let stood = self.predict(&increment, dt_s);
+            // Nothing was seen for a while in which wheels stood still: they stand still, too, when somebody carries it.
+            let carried = stamp_ns.saturating_sub(self.stamp_ns) > CARRIED_NS && is_still(&increment, dt_s);
             if !blind && self.trust.is_adrift() {
-                if !self.resume(&sweep) {
+                if !self.resume(&sweep, &Stood { dt_s: self.trust.unseen_s(), ..stood }) {
                     frozen = self.start_over();
                 }
                 self.trust.settle();
@@ -198,8 +210,10 @@ impl FrontEnd {
                 self.land();
                 frozen = self.freeze(self.path_m);
                 self.clear_local();
-            } else {
+            } else if !carried || blind {
                 self.correct(&sweep, &stood);
+            } else if !self.resume(&sweep, &stood) {
+                frozen = self.start_near(dt_s);
             }
         }
         (self.odom_from_body, self.stamp_ns) = (Some(odom_from_body), stamp_ns);
@@ -259,10 +273,9 @@ impl FrontEnd {
         let mut in_map = self.in_map;
         in_map.drive(&step);
         let stood = Stood {
-            front_from_body,
-            dt_s,
             by_wheels: front_from_body.compose(&step.motion),
             spread: in_map.covariance(&self.wheels),
+            ..self.stands(dt_s)
         };
         let (motion, noise) = self.trust.pass(dt_s, *increment != Pose2::default());
         if self.trust.is_lost() {
@@ -273,6 +286,20 @@ impl FrontEnd {
         self.drive_dark(&step);
         self.front_from_body = front_from_body.compose(&step.motion);
         stood
+    }
+
+    /// Where the body is, with the next scan so much later.
+    fn stands(&self, dt_s: f64) -> Stood {
+        let known = self.in_map.covariance(&self.wheels);
+        let front_from_body = self.front_from_body;
+        Stood { front_from_body, dt_s, by_wheels: front_from_body, spread: known, known }
+    }
+
+    /// Time since the scan before, never much less than usual: stamps jitter.
+    fn since_s(&mut self, stamp_ns: StampNs) -> f64 {
+        let dt_s = stamp_ns.saturating_sub(self.stamp_ns).max(0) as f64 * 1e-9;
+        self.period_s += PERIOD_GAIN * (dt_s.min(PERIOD_MAX_S) - self.period_s);
+        dt_s.max(0.5 * self.period_s)
     }
 
     fn stride(&mut self) {
@@ -289,29 +316,6 @@ impl FrontEnd {
         let covariance = self.in_map.covariance(&self.wheels);
         let (d2, yaw2) = (covariance[(0, 0)].max(covariance[(1, 1)]), covariance[(2, 2)]);
         self.wheels.unseen_m() > VAGUE_PATH_M && (d2 > VAGUE_M.powi(2) || yaw2 > VAGUE_RAD.powi(2))
-    }
-
-    /// Leaves the local map behind: so far along the path that none of its places is taken for part
-    /// of the new one.
-    fn clear_local(&mut self) {
-        self.keys.clear();
-        self.local = None;
-        self.path_m += 2.0 * LOCAL_PATH_M;
-        self.in_map = Drift::default();
-        self.wheels.lift();
-        self.contrast.lift();
-        self.stride_from = self.front_from_body;
-    }
-
-    /// The link to what was is lost: a new local map, and a chain edge that says next to nothing.
-    /// Whether the robot is still where it was is for the particles to find out: a scan that fits
-    /// the old local map may be a look-alike that it was carried to.
-    fn start_over(&mut self) -> Vec<FrozenPlace> {
-        let frozen = self.freeze(f64::INFINITY);
-        self.fresh = true;
-        self.clear_local();
-        self.since_place = Drift::of(Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0)));
-        frozen
     }
 
     /// Begins a place where the last one is far enough behind.
@@ -359,10 +363,12 @@ fn content<'a>(keys: impl Iterator<Item = &'a Key>, front_from_frame: &Pose2) ->
     Content::new(&sweeps)
 }
 
+mod anew;
 mod bridge;
 mod contrast;
 mod keys;
 mod registration;
+mod search;
 #[cfg(test)]
 mod tests;
 mod trust;

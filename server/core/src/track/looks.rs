@@ -11,6 +11,10 @@ const FROZEN_RAD: f64 = 0.02;
 const APART_NS: i64 = 1_000_000_000;
 /// … by the same from scan to scan, are of another clock.
 const STEADY_NS: i64 = 300_000_000;
+/// A laser whose first scans all have their finite ranges beyond reach, not all of them alike, and taken for
+/// millimetres within it, sends millimetres.
+const MILLIMETRE_SCANS: u32 = 10;
+const MILLIMETRES_UNLIKE: usize = 10;
 /// Scans in a row in which nothing is within reach, and path in odometry meanwhile, before that is told.
 const BLIND_SCANS: u32 = 20;
 const BLIND_M: f64 = 1.0;
@@ -25,6 +29,9 @@ pub(super) struct Looks {
     lag_ns: Option<i64>,
     blind: u32,
     blind_from: Pose2,
+    /// Scans from the first on that would make sense in millimetres; none since one made sense in metres.
+    in_millimetres: Option<u32>,
+    seen_any: bool,
 }
 
 impl Looks {
@@ -40,6 +47,28 @@ impl Looks {
         } else {
             (scan.stamp_ns, None)
         }
+    }
+
+    /// Whether a laser sends millimetres, going by its first scans.
+    pub fn sends_millimetres(&mut self, scan: &Scan, range_min_m: f64, range_max_m: f64) -> bool {
+        let sent = self.in_millimetres.unwrap_or(0);
+        if sent >= MILLIMETRE_SCANS || (self.seen_any && self.in_millimetres.is_none()) {
+            return sent >= MILLIMETRE_SCANS;
+        }
+        self.seen_any = true;
+        let mut finite: Vec<f64> =
+            scan.ranges_m.iter().filter(|r| r.is_finite()).map(|r| f64::from(*r)).collect();
+        if finite.is_empty() {
+            self.seen_any = self.in_millimetres.is_some();
+            return false;
+        }
+        finite.sort_by(f64::total_cmp);
+        let within = finite.iter().filter(|r| (range_min_m..range_max_m).contains(&(*r / 1000.0))).count();
+        let far = finite.iter().all(|r| *r > range_max_m);
+        finite.dedup();
+        let plausible = far && 2 * within > scan.ranges_m.len() / 2 && finite.len() >= MILLIMETRES_UNLIKE;
+        self.in_millimetres = plausible.then_some(sent + 1);
+        false
     }
 
     /// Whether a scan repeats the one before, though the robot has moved since.
@@ -108,6 +137,25 @@ mod tests {
         assert!(!looks.is_frozen(&scan(1, 1.0), &at(0.0)), "it stands");
         assert!(looks.is_frozen(&scan(2, 1.0), &at(0.1)));
         assert!(!looks.is_frozen(&scan(3, 1.01), &at(0.2)));
+    }
+
+    #[test]
+    fn millimetres_are_told_by_the_first_scans() {
+        let sent = |looks: &mut Looks, range_m: &dyn Fn(usize) -> f32| {
+            let ranges_m = (0..100).map(range_m).collect();
+            looks.sends_millimetres(&Scan { ranges_m, ..scan(0, 1.0) }, 0.05, 20.0)
+        };
+        let millimetres = |k: usize| 1500.0 + 10.0 * k as f32;
+        let mut looks = Looks::default();
+        let told: Vec<bool> = (0..12).map(|_| sent(&mut looks, &millimetres)).collect();
+        assert_eq!(told.iter().position(|t| *t), Some(10));
+        assert!(sent(&mut looks, &|_| 5.0), "once told it stays");
+        // In the open a SICK says the same of all rays; and who once sent metres sends metres.
+        for first in [|_| 81.91, |k| 1.0 + k as f32 * 0.01] as [fn(usize) -> f32; 2] {
+            let mut looks = Looks::default();
+            sent(&mut looks, &first);
+            assert!((0..40).all(|_| !sent(&mut looks, &millimetres)));
+        }
     }
 
     #[test]

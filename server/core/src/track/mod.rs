@@ -99,10 +99,20 @@ impl Track {
     }
 
     /// Takes a scan, to wait for its odometry.
-    pub fn scan(&mut self, scan: Scan, effects: &mut Effects) {
-        if self.lasers.contains_key(&scan.laser) {
+    pub fn scan(&mut self, mut scan: Scan, effects: &mut Effects) {
+        if let Some(laser) = self.lasers.get(&scan.laser) {
             let looks = self.looks.entry(scan.laser.clone()).or_default();
-            let (taken_ns, apart_ns) = looks.taken_ns(&scan, self.odometry.newest_ns());
+            if looks.sends_millimetres(&scan, laser.range_min_m, laser.range_max_m) {
+                scan.ranges_m.iter_mut().for_each(|range| *range /= 1000.0);
+                self.suspect(scan.stamp_ns, Suspicion::Millimetres, effects, || {
+                    format!(
+                        "ranges of laser {:?} are far beyond its reach: they are taken for millimetres",
+                        scan.laser
+                    )
+                });
+            }
+            let looks = self.looks.entry(scan.laser.clone()).or_default();
+            let (taken_ns, apart_ns) = looks.taken_ns(&scan, self.odometry.arrived_ns());
             if let Some(apart_ns) = apart_ns {
                 let (s, laser) = (apart_ns as f64 * 1e-9, &scan.laser);
                 let side = if s > 0.0 { "behind" } else { "ahead of" };
@@ -122,7 +132,8 @@ impl Track {
     pub fn next_due(&mut self, now_ns: Option<StampNs>) -> Option<Waiting> {
         let end_ns = sweep_end_ns(self.waiting.front()?);
         let bracketed = self.odometry.newest_ns().is_some_and(|newest| newest >= end_ns);
-        let late = now_ns.is_none_or(|now| now.saturating_sub(end_ns) > WAIT_NS);
+        let wait_ns = WAIT_NS.max((1.5e9 * self.odometry.period_s()) as i64);
+        let late = now_ns.is_none_or(|now| now.saturating_sub(end_ns) > wait_ns);
         if bracketed || late || self.waiting.len() > WAITING_MAX { self.waiting.pop_front() } else { None }
     }
 
@@ -185,6 +196,12 @@ impl Track {
 
     /// Whether scans and wheels agree in the long run.
     fn compare(&mut self, stamp_ns: StampNs, effects: &mut Effects) {
+        if self.odometry.is_stale() {
+            let s = self.odometry.period_s();
+            self.suspect(stamp_ns, Suspicion::Stale, effects, || {
+                format!("odometry repeats each pose for {s:.1} s: what is between is interpolated")
+            });
+        }
         if self.front.wheels_stand_still() {
             self.suspect(stamp_ns, Suspicion::Still, effects, || {
                 "odometry stands still while scans move: they alone tell the way".to_owned()

@@ -19,11 +19,24 @@ fn is_near(a: &Pose2, b: &Pose2) -> bool {
     a.distance_m(b) < 0.5 && a.between(b).yaw_rad.abs() < 0.3
 }
 
+/// A pose may be held for so long until the next one: who repeats it for longer stands still.
+const HELD_MAX_S: f64 = 2.5;
+/// How fast it is learned whether poses are held and for how long, per motion.
+const HELD_GAIN: f64 = 0.1;
+
 /// Recent odometry, in the order of arrival.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Odometry {
     recent: VecDeque<(StampNs, Pose2)>,
     boot: u64,
+    /// Stamp of the newest message, be its pose held or not.
+    arrived_ns: Option<StampNs>,
+    /// When the newest pose came first, and whether it was repeated, bit by bit.
+    since_ns: StampNs,
+    held: bool,
+    /// Of motions lately, the share that came after a pose was held, and for how long it was, seconds.
+    held_share: f64,
+    held_s: f64,
 }
 
 /// What a new odometry pose means.
@@ -60,6 +73,10 @@ impl Odometry {
             self.recent.clear();
         }
         self.boot = odom.boot;
+        self.arrived_ns = Some(odom.stamp_ns);
+        if self.holds(odom) {
+            return step;
+        }
         self.recent.push_back((odom.stamp_ns, odom.odom_from_body));
         if self.recent.len() > KEPT {
             self.recent.pop_front();
@@ -67,7 +84,44 @@ impl Odometry {
         step
     }
 
-    /// Newest stamp, if any.
+    /// Whether a pose is the one before, repeated until there is a newer one: of where the robot is meanwhile it says
+    /// nothing.
+    fn holds(&mut self, odom: &Odom) -> bool {
+        let Some((_, last)) = self.recent.back() else {
+            self.since_ns = odom.stamp_ns;
+            return false;
+        };
+        let since_s = odom.stamp_ns.saturating_sub(self.since_ns).max(0) as f64 * 1e-9;
+        if *last == odom.odom_from_body {
+            self.held = true;
+            return self.is_stale() && since_s < HELD_MAX_S.min(1.5 * self.held_s);
+        }
+        let held = std::mem::take(&mut self.held);
+        if held && since_s < HELD_MAX_S {
+            let first = self.held_share < HELD_GAIN;
+            self.held_s += if first { 1.0 } else { HELD_GAIN } * (since_s - self.held_s);
+        }
+        self.held_share += HELD_GAIN * (f64::from(u8::from(held)) - self.held_share);
+        self.since_ns = odom.stamp_ns;
+        false
+    }
+
+    /// Whether odometry is slower than its messages: most motions come after a pose was repeated.
+    pub fn is_stale(&self) -> bool {
+        self.held_share > 0.5
+    }
+
+    /// How long one waits for odometry that is newer, seconds.
+    pub fn period_s(&self) -> f64 {
+        if self.is_stale() { self.held_s } else { 0.0 }
+    }
+
+    /// Stamp of the newest message, if any.
+    pub fn arrived_ns(&self) -> Option<StampNs> {
+        self.arrived_ns
+    }
+
+    /// Newest stamp of a pose that is not merely held, if any.
     pub fn newest_ns(&self) -> Option<StampNs> {
         self.recent.back().map(|r| r.0)
     }
@@ -124,5 +178,27 @@ mod tests {
         assert_eq!(o.push(&odom(5_000_000_000, 5.0, 1)), Step::Continued);
         assert!(matches!(o.push(&odom(9_000_000_000, 0.1, 1)), Step::Broken(_)), "from 0 after a silence");
         assert!((o.at(0).unwrap().x_m - 0.1).abs() < 1e-12, "what was before the break is forgotten");
+    }
+
+    #[test]
+    fn what_is_repeated_until_there_is_newer_is_interpolated() {
+        let mut o = Odometry::default();
+        // 10 messages a second, measured at each fifth.
+        let told = |k: i64| odom(k * 100_000_000, 0.5 * (k / 5) as f64, 0);
+        for k in 0..100 {
+            o.push(&told(k));
+        }
+        assert!(o.is_stale() && (o.period_s() - 0.5).abs() < 0.05, "{}", o.period_s());
+        o.push(&told(100));
+        assert!((o.at(9_700_000_000).unwrap().x_m - 9.7).abs() < 1e-9, "between the measurements");
+        // Who stands still is not waited for.
+        for k in 101..130 {
+            o.push(&odom(k * 100_000_000, 10.0, 0));
+        }
+        assert_eq!(o.newest_ns(), o.arrived_ns());
+        // Wheels that are measured each time hold nothing.
+        let mut o = Odometry::default();
+        (0..100).for_each(|k| drop(o.push(&odom(k * 100_000_000, 0.1 * k as f64, 0))));
+        assert!(!o.is_stale());
     }
 }

@@ -1,9 +1,9 @@
 //! Two halls of one plan at a dark yard: which one the robot came back to, nothing tells before their far
 //! ends do.
 
-use crate::run;
 use crate::world::{laser, scan};
 use std::f64::consts::PI;
+use toponym_core::effects::{Effect, TrackState};
 use toponym_core::event::{Event, Laser, Odom, Setup};
 use toponym_core::geometry::Pose2;
 use toponym_core::{Config, Mapper};
@@ -94,12 +94,18 @@ pub fn events(poses: &[Pose2], most: f64) -> Vec<Event> {
     events
 }
 
-/// Weights of the graphs after a drive, best first.
-fn weights(y_m: f64, x_m: f64, slip: f64) -> Vec<f64> {
+/// Weights of the graphs after a drive, best first, and whether the robot was told to be mapping at its end.
+fn weights(y_m: f64, x_m: f64, slip: f64) -> (Vec<f64>, bool) {
     let mut mapper = Mapper::new(Config::default());
-    run(&mut mapper, &events(&drive(y_m, x_m), slip));
-    mapper.step(Event::Flush);
-    mapper.snapshot().graph().particles.iter().map(|p| p.weight).collect()
+    let (mut maps, events) = (true, events(&drive(y_m, x_m), slip));
+    for event in events.into_iter().chain([Event::Flush]) {
+        for effect in mapper.step(event) {
+            if let Effect::StateChanged { state, .. } = effect {
+                maps = state == TrackState::Mapping;
+            }
+        }
+    }
+    (mapper.snapshot().graph().particles.iter().map(|p| p.weight).collect(), maps)
 }
 
 #[test]
@@ -125,8 +131,10 @@ const SLIPS: [f64; 4] = [0.1, 0.15, 0.2, 0.25];
 #[test]
 fn doubt_comes_where_halls_look_alike() {
     let drives = SLIPS.iter().flat_map(|&slip| [(0.0, slip), (APART_M, slip)]);
-    let best: Vec<f64> = drives.map(|(y_m, slip)| weights(y_m, 8.0, slip)[0]).collect();
-    assert!(best.iter().all(|w| *w < 0.99), "none is assured: {best:?}");
+    let told: Vec<_> = drives.map(|(y_m, slip)| weights(y_m, 8.0, slip)).collect();
+    let best: Vec<f64> = told.iter().map(|(weights, _)| weights[0]).collect();
+    // One graph may be left over while all say that the robot is lost in it.
+    assert!(told.iter().all(|(weights, maps)| weights[0] < 0.99 || !maps), "none is assured: {told:?}");
     assert!(best.iter().sum::<f64>() / (best.len() as f64) < 0.95, "{best:?}");
 }
 
@@ -135,7 +143,7 @@ fn doubt_comes_where_halls_look_alike() {
 #[ignore = "what contradicts is paid for once in five metres: the far end leaves .76 where .9 is wanted"]
 fn doubt_goes_where_halls_part() {
     for y_m in [0.0, APART_M] {
-        let told = weights(y_m, 1.5, SLIPS[0]);
+        let (told, _) = weights(y_m, 1.5, SLIPS[0]);
         assert!(told[0] > 0.9, "{y_m}: {told:?}");
     }
 }

@@ -1,7 +1,7 @@
 //! A scan laid on the local map, and what that is worth.
 
 use crate::geometry::Pose2;
-use crate::scan::align::{Alignment, CORRELATED_BEAMS, Prior, SIGMA_M, align, sound_information};
+use crate::scan::align::{Alignment, CORRELATED_BEAMS, Prior, SIGMA_M, align};
 use crate::scan::cloud::{Point, thin};
 use crate::scan::place::VOXEL_M;
 use crate::scan::sweep::Sweep;
@@ -10,9 +10,9 @@ use crate::track::wheels::Drift;
 use nalgebra::{Matrix3, Vector3};
 
 /// Largest distance between a point and its surface when registration begins.
-const GATE_M: f32 = 0.6;
+pub(super) const GATE_M: f32 = 0.6;
 /// Headings farther from where it begins are not found.
-const LEAP_RAD: f64 = 0.35;
+pub(super) const LEAP_RAD: f64 = 0.35;
 /// What no robot among people exceeds: what seems to is a look-alike.
 const SPEED_MAX_M_S: f64 = 3.0;
 const TURN_MAX_RAD_S: f64 = 4.0;
@@ -20,9 +20,13 @@ const TURN_MAX_RAD_S: f64 = 4.0;
 const SHARE_SURE: f64 = 0.6;
 /// Below it the scan says nothing about the pose.
 const SHARE_MIN: f64 = 0.25;
+/// … and if nothing else does, below this.
+const SHARE_LEAST: f64 = 0.15;
 /// A fit of so much less than usual is suspected to be held where wheels want it, and so much more shows that it is.
 const LESS: f64 = 0.05;
 const MORE: f64 = 0.08;
+/// Where nothing else says that it is near, a fit of so much less is none.
+const FAR_LESS: f64 = 0.15;
 /// How fast what is usual is learned, per scan.
 const USUAL_GAIN: f64 = 0.05;
 /// Wheels err with a bias (a scale, a bent axle), and fused at each scan a bias adds up: odometry
@@ -46,6 +50,9 @@ const LOOK_PATH_PER_RAD_M: f64 = 2.0;
 /// φ of a stretch over which scans alone say where the robot is after its odometry broke: what was next to it
 /// may look like what it was carried to.
 const RESUMED: f64 = 0.2;
+/// φ where they say that it stayed where it was, to so much, metres and radians.
+const STAYED: f64 = 0.04;
+const STAYED_M: f64 = 0.1;
 /// φ where a scan that shows something is laid on nothing, or hardly.
 const UNREGISTERED: f64 = 0.03;
 const HARDLY_REGISTERED: f64 = 0.003;
@@ -62,11 +69,13 @@ pub(crate) struct Stood {
     pub by_wheels: Pose2,
     /// Covariance of that.
     pub spread: Matrix3<f64>,
+    /// Covariance of where it was.
+    pub known: Matrix3<f64>,
 }
 
 impl Stood {
     /// Whether a robot may have come there since.
-    fn reaches(&self, front_from_body: &Pose2) -> bool {
+    pub(super) fn reaches(&self, front_from_body: &Pose2) -> bool {
         let step = self.front_from_body.between(front_from_body);
         step.x_m.hypot(step.y_m) < f64::from(GATE_M) + SPEED_MAX_M_S * self.dt_s
             && step.yaw_rad.abs() < LEAP_RAD + TURN_MAX_RAD_S * self.dt_s
@@ -87,18 +96,12 @@ impl FrontEnd {
         let points = thin(&sweep.points, VOXEL_M);
         let mut moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
         let is_lost = self.trust.is_lost();
-        let mut found = self.register(&points, &prior);
-        if found.is_none() || leaps(&stood.front_from_body.between(&self.front_from_body)) {
-            let as_good = |a: &Alignment| found.is_none_or(|f| a.inlier_share >= f.inlier_share);
-            let reached = self.around(&points, &stood.front_from_body, |pose| stood.reaches(pose));
-            found = reached.filter(as_good).or(found);
-        }
-        if found.is_some_and(|f| f.inlier_share < self.usual_share - LESS) {
-            let near = self.front_from_body;
-            let rival = self.freely(&points, &near);
-            let better = |r: &Alignment| found.is_none_or(|f| r.inlier_share >= f.inlier_share + MORE);
-            found = rival.filter(|r| better(r) && stood.reaches(&r.target_from_source)).or(found);
-        }
+        let per_point = looks_per_point(sweep, &points);
+        let found = if is_lost {
+            self.search(&points, stood, per_point).filter(|f| f.inlier_share >= SHARE_LEAST)
+        } else {
+            self.near_wheels(&points, &prior, stood, per_point)
+        };
         let Some(found) = found else {
             self.doubt(if is_lost { NEITHER } else { UNREGISTERED });
             return;
@@ -114,20 +117,13 @@ impl FrontEnd {
         self.usual_share += USUAL_GAIN * (found.inlier_share - self.usual_share);
         self.rough_m += ROUGH_GAIN * (found.residual_m - self.rough_m);
         let rough = (self.rough_m / SIGMA_M).powi(2);
-        // So many independent looks at surfaces, however dense the beams.
-        let per_point = surfaces_m(sweep) / LOOK_M / points.len() as f64;
         let look = found.information * (CORRELATED_BEAMS * per_point / rough);
         let map = Matrix3::from_diagonal(&MAP_SIGMAS.component_mul(&MAP_SIGMAS)) * rough;
         let moved = stood.front_from_body.between(&found.target_from_source);
         if is_lost {
             moved_m = moved_m.max(moved.x_m.hypot(moved.y_m) + LOOK_PATH_PER_RAD_M * moved.yaw_rad.abs());
         }
-        let said = if is_lost {
-            sound_information(&points, self.local(), &found, GATE_M / 8.0)
-        } else {
-            found.information
-        };
-        let said = said * (CORRELATED_BEAMS * per_point / rough) + Matrix3::identity();
+        let said = found.information * (CORRELATED_BEAMS * per_point / rough) + Matrix3::identity();
         if let Some(told) = said.try_inverse() {
             let parted = stood.by_wheels.between(&found.target_from_source).log();
             self.trust.saw(&moved, &parted, &(stood.spread + told + map));
@@ -148,12 +144,28 @@ impl FrontEnd {
         }
     }
 
+    /// Where the points fit near what wheels say, or if they moved it that nothing fits there, where it may be at all.
+    fn near_wheels(
+        &mut self,
+        points: &[Point],
+        prior: &Prior,
+        stood: &Stood,
+        per_point: f64,
+    ) -> Option<Alignment> {
+        let mut found = self.register(points, prior);
+        let leapt = leaps(&stood.front_from_body.between(&self.front_from_body));
+        if leapt || found.is_none_or(|f| f.inlier_share < self.usual_share - LESS) {
+            let least = |f: Alignment| if leapt { f.inlier_share } else { f.inlier_share + MORE };
+            let rival = self.search(points, stood, per_point).filter(|r| r.inlier_share >= SHARE_SURE);
+            found = rival.filter(|r| found.is_none_or(|f| r.inlier_share >= least(f))).or(found);
+        }
+        found
+    }
+
     fn register(&mut self, points: &[Point], prior: &Prior) -> Option<Alignment> {
         let guess = prior.target_from_source;
-        // Without wheels nothing else tells the way along what seems bare.
-        let all_stands = self.trust.is_lost() && self.is_short();
         let local = self.local();
-        local.all_stands = all_stands;
+        local.all_stands = false;
         let mut best = align(points, local, &guess, Some(prior), GATE_M);
         if best.is_none_or(|b| b.inlier_share < SHARE_SURE) {
             // A fast turn or a slip: start from other headings too.
@@ -170,46 +182,20 @@ impl FrontEnd {
         best.filter(|b| b.inlier_share >= SHARE_MIN)
     }
 
-    /// Where the points fit near a pose if wheels say nothing.
-    fn freely(&mut self, points: &[Point], near: &Pose2) -> Option<Alignment> {
-        let information = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
-        let prior = Prior { target_from_source: *near, information, where_weak: 1.0 };
-        let is_short = self.is_short();
-        let local = self.local();
-        local.all_stands = is_short;
-        let found = align(points, local, near, Some(&prior), GATE_M);
-        found.filter(|f| f.inlier_share >= SHARE_SURE)
-    }
-
-    /// Where in the local map that it may be, from a place and any heading, the points surely fit.
-    fn around(
-        &mut self,
-        points: &[Point],
-        here: &Pose2,
-        may_be: impl Fn(&Pose2) -> bool,
-    ) -> Option<Alignment> {
-        let wide = Matrix3::from_diagonal(&Vector3::new(4.0, 4.0, 2.0));
-        let local = self.local();
-        let from = |k: i32| {
-            let guess = here.compose(&Pose2::new(0.0, 0.0, f64::from(k) * 0.35));
-            let prior = Prior { target_from_source: guess, information: wide, where_weak: 1.0 };
-            align(points, local, &guess, Some(&prior), GATE_M)
-        };
-        let fits = (0..18).filter_map(from).filter(|a| may_be(&a.target_from_source));
-        let best = fits.max_by(|a, b| a.inlier_share.total_cmp(&b.inlier_share));
-        best.filter(|b| b.inlier_share >= SHARE_SURE)
-    }
-
-    /// After a break too short for the robot to have been carried off: where in the local map is it
-    /// now, whatever its odometry says?
-    pub(crate) fn resume(&mut self, sweep: &Sweep) -> bool {
-        let here = self.front_from_body;
-        let Some(found) = self.around(&thin(&sweep.points, VOXEL_M), &here, |_| true) else { return false };
+    /// After a break too short for the robot to have been carried off, or after some seconds without wheels and scans:
+    /// where in the local map is it now, whatever its odometry says?
+    pub(crate) fn resume(&mut self, sweep: &Sweep, stood: &Stood) -> bool {
+        let points = thin(&sweep.points, VOXEL_M);
+        let found = self.search(&points, stood, looks_per_point(sweep, &points));
+        let sure = SHARE_SURE.max(self.usual_share - FAR_LESS);
+        let Some(found) = found.filter(|f| f.inlier_share >= sure) else { return false };
         self.front_from_body = found.target_from_source;
         self.stride_from = self.front_from_body;
         self.wheels.lift();
         self.contrast.lift();
-        self.doubt(RESUMED);
+        let moved = stood.front_from_body.between(&found.target_from_source);
+        let stayed = moved.x_m.hypot(moved.y_m) < STAYED_M && moved.yaw_rad.abs() < STAYED_M;
+        self.doubt(if stayed { STAYED } else { RESUMED });
         true
     }
 }
@@ -222,6 +208,11 @@ fn leaps(step: &Pose2) -> bool {
 /// φ by how far scans and wheels part, distance²: of what a few standard deviations explain, nothing.
 fn failed_by(distance2: f64) -> f64 {
     PARTED.iter().rev().find(|(least, _)| distance2 >= *least).map_or(0.0, |(_, failed)| *failed)
+}
+
+/// Independent looks at surfaces that a point stands for, however dense the beams.
+fn looks_per_point(sweep: &Sweep, points: &[Point]) -> f64 {
+    surfaces_m(sweep) / LOOK_M / points.len() as f64
 }
 
 /// Length of the surfaces that a sweep shows, metres: a point stands for no more than [`LOOK_M`].

@@ -1,3 +1,5 @@
+mod unaided;
+
 use super::*;
 use crate::event::{Laser, Scan};
 use crate::scan::sweep::sweep;

@@ -8,9 +8,10 @@
 //! p(e | right) = Π_k N(e_k; S_k) with a tail,   p(e | wrong) = Π_k ½ p(e_k | right) + ½ N(e_k; S_k + W_k)
 //! ```
 //!
-//! with S the variances of both together, W what robots can do meanwhile (who slips ahead need not turn), filtered forwards. While they are more likely wrong than right, the robot is
-//! thought to go on as scans last saw it move. Scans that see nothing say nothing: then what is known of
-//! wheels that move decays towards how often they are wrong at all.
+//! with S the variances of both together, W what robots can do meanwhile (who slips ahead need not turn), filtered forwards.
+//! While they are more likely wrong than right, the scan is searched for wherever robots may go meanwhile
+//! (`search.rs`). Scans that see nothing say nothing: then what is known of wheels that move decays towards how often
+//! they are wrong at all.
 
 use crate::geometry::Pose2;
 use nalgebra::{Matrix3, Vector3};
@@ -29,6 +30,13 @@ const LATE_RAD: f64 = 0.05;
 /// How much a speed changes within a second.
 const FASTER_M_S2: f64 = 0.7;
 const FASTER_RAD_S2: f64 = 1.5;
+/// It goes on as it did or stands, each to so much, from one scan to the next with such probabilities.
+const GOES_ON: f64 = 0.3;
+const STANDS: f64 = 0.01;
+const STANDS_M: f64 = 0.03;
+/// Otherwise it moves by anything up to this, one standard deviation.
+const ANY_M_S: f64 = 0.5;
+const ANY_RAD_S: f64 = 0.5;
 /// After so long without a look and without wheels the robot may have been carried off.
 const ADRIFT_S: f64 = 3.0;
 /// A speed that scans saw longer ago says nothing any more.
@@ -41,12 +49,14 @@ pub(super) struct Trust {
     wrong: f64,
     /// The body's speed as scans last saw it: x, y, yaw per second, and since how long it is not seen.
     speed: Vector3<f64>,
+    /// What it did from one scan to the next.
+    step: Vector3<f64>,
     unseen_s: f64,
 }
 
 impl Default for Trust {
     fn default() -> Self {
-        Self { wrong: FAILS / RECOVERS, speed: Vector3::zeros(), unseen_s: 0.0 }
+        Self { wrong: FAILS / RECOVERS, speed: Vector3::zeros(), step: Vector3::zeros(), unseen_s: 0.0 }
     }
 }
 
@@ -73,7 +83,8 @@ impl Trust {
         self.wrong = self.wrong * (1.0 - recovers) + (1.0 - self.wrong) * FAILS;
         self.unseen_s += dt_s;
         let still_known = self.unseen_s - dt_s < SEEN_LATELY_S;
-        let motion = if still_known { Pose2::exp(&(self.speed * dt_s)) } else { Pose2::default() };
+        let motion =
+            if still_known { Pose2::exp(&(self.speed * dt_s.min(SEEN_LATELY_S))) } else { Pose2::default() };
         let (d_m, turn_rad) = if still_known {
             (FASTER_M_S2 * dt_s * dt_s + 0.01, FASTER_RAD_S2 * dt_s * dt_s + 0.01)
         } else {
@@ -82,11 +93,54 @@ impl Trust {
         (motion, squares(d_m, turn_rad))
     }
 
+    /// What it may have done in `dt_s` if it goes on: as fast as it was seen to, or as far from scan to scan, for stamps
+    /// jitter.
+    pub fn goes_on(&self, dt_s: f64) -> [Vector3<f64>; 2] {
+        let known = if self.unseen_s - dt_s < SEEN_LATELY_S { 1.0 } else { 0.0 };
+        [self.speed * dt_s.min(SEEN_LATELY_S) * known, self.step * known]
+    }
+
+    /// Log-density, but for a constant, of a motion if wheels say nothing: the robot goes on as it was last seen to, or
+    /// stands, or does anything that robots do. `known`: covariance of where it was.
+    pub fn log_expects(&self, moved: &Pose2, dt_s: f64, known: &Matrix3<f64>) -> f64 {
+        let moved = moved.log();
+        let density = |from: &Vector3<f64>, d_m: f64, turn_rad: f64| {
+            let e = moved - from;
+            normal(e.x, d_m * d_m + known[(0, 0)])
+                * normal(e.y, d_m * d_m + known[(1, 1)])
+                * normal(e.z, turn_rad * turn_rad + known[(2, 2)])
+        };
+        let on: f64 = self
+            .goes_on(dt_s)
+            .iter()
+            .map(|w| density(w, 0.3 * w.xy().norm() + STANDS_M, 0.3 * w.z.abs() + STANDS_M))
+            .sum();
+        let stands = density(&Vector3::zeros(), STANDS_M, STANDS_M);
+        let any = density(&Vector3::zeros(), ANY_M_S * dt_s + LATE_M, ANY_RAD_S * dt_s + LATE_RAD);
+        (0.5 * GOES_ON * on + STANDS * stands + (1.0 - GOES_ON - STANDS) * any).max(f64::MIN_POSITIVE).ln()
+    }
+
+    /// Since when scans have not told where it is.
+    pub fn unseen_s(&self) -> f64 {
+        self.unseen_s
+    }
+
+    /// How far it may have turned meanwhile: three standard deviations.
+    pub fn may_turn_rad(dt_s: f64) -> f64 {
+        3.0 * (ANY_RAD_S * dt_s + LATE_RAD)
+    }
+
+    /// How far it may have gone: two.
+    pub fn may_go_m(dt_s: f64) -> f64 {
+        2.0 * (ANY_M_S * dt_s + LATE_M)
+    }
+
     /// Scans saw a motion, off from that of the wheels by `parted`; `spread`: S.
     pub fn saw(&mut self, moved: &Pose2, parted: &Vector3<f64>, spread: &Matrix3<f64>) {
         let dt_s = std::mem::take(&mut self.unseen_s);
         if dt_s > 0.0 {
-            self.speed = moved.log() / dt_s;
+            self.step = moved.log();
+            self.speed = self.step / dt_s;
         }
         let may = [SPEED_M_S * dt_s + LATE_M, SPEED_M_S * dt_s + LATE_M, SPEED_RAD_S * dt_s + LATE_RAD];
         let (mut right, mut wrong) = (1.0, 1.0);

@@ -1,0 +1,54 @@
+//! Local maps begun anew: when what is seen has no more to do with what was.
+
+use crate::geometry::Pose2;
+use crate::track::front::trust::Trust;
+use crate::track::front::{FrontEnd, LOCAL_PATH_M};
+use crate::track::places::FrozenPlace;
+use crate::track::wheels::Drift;
+use nalgebra::{Matrix3, Vector3};
+
+/// Slower wheels, metres or radians a second, do not drive it anywhere.
+const STILL_M_S: f64 = 0.05;
+/// Standard deviation of any heading.
+const AROUND_RAD: f64 = 1.8;
+
+impl FrontEnd {
+    /// Leaves the local map behind: so far along the path that none of its places is taken for part
+    /// of the new one.
+    pub(super) fn clear_local(&mut self) {
+        self.keys.clear();
+        self.local = None;
+        self.path_m += 2.0 * LOCAL_PATH_M;
+        self.in_map = Drift::default();
+        self.wheels.lift();
+        self.contrast.lift();
+        self.stride_from = self.front_from_body;
+    }
+
+    /// The link to what was is lost: a new local map, and a chain edge that says next to nothing.
+    /// Whether the robot is still where it was is for the particles to find out: a scan that fits
+    /// the old local map may be a look-alike that it was carried to.
+    pub(super) fn start_over(&mut self) -> Vec<FrozenPlace> {
+        let frozen = self.freeze(f64::INFINITY);
+        self.fresh = true;
+        self.clear_local();
+        self.since_place = Drift::of(Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0)));
+        frozen
+    }
+
+    /// A new local map, for what is seen is not what was: somewhere near, as far as people walk.
+    pub(super) fn start_near(&mut self, dt_s: f64) -> Vec<FrozenPlace> {
+        let frozen = self.freeze(f64::INFINITY);
+        let before = self.since_place();
+        self.clear_local();
+        let turn_rad = (Trust::may_turn_rad(dt_s) / 1.5).min(AROUND_RAD);
+        let near = Vector3::new(Trust::may_go_m(dt_s), Trust::may_go_m(dt_s), turn_rad);
+        self.since_place = Drift::of(before + Matrix3::from_diagonal(&near.component_mul(&near)));
+        frozen
+    }
+}
+
+/// Whether wheels that turn would have moved it farther meanwhile.
+pub(super) fn is_still(increment: &Pose2, dt_s: f64) -> bool {
+    increment.x_m.hypot(increment.y_m) < STILL_M_S * dt_s && increment.yaw_rad.abs() < STILL_M_S * dt_s
+}
