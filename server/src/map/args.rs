@@ -38,8 +38,8 @@ pub struct MapArgs {
     #[arg(long, value_name = "S", conflicts_with = "start_map")]
     pub seed: Option<u64>,
     /// Threads; the result does not depend on them [default: one per core]
-    #[arg(long, value_name = "N")]
-    pub threads: Option<usize>,
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=256))]
+    pub threads: Option<u16>,
     /// Do not listen to sentences
     #[arg(long, conflicts_with = "start_map")]
     pub no_language: bool,

@@ -43,7 +43,7 @@ pub fn run(args: &MapArgs) -> Result<()> {
         None => Mapper::on_trial(args.config(), args.trial()),
     };
     let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(args.threads.unwrap_or(0))
+        .num_threads(args.threads.unwrap_or(0).into())
         .build()
         .context("--threads: the threads could not be started; give a smaller number")?;
     let finished = pool.install(|| play(log, mapper, args))?;
@@ -141,11 +141,19 @@ impl Finished {
             draw(&self.played.mapper, &self.trajectory, file)
                 .with_context(|| format!("--image {}", file.display()))?;
         }
-        print!("{}", summary::text(args, &self));
+        said(std::io::stdout().write_all(summary::text(args, &self).as_bytes()))?;
         let Some(file) = &args.report else { return Ok(()) };
         let Self { played, graph, answers, notes, robot, timing, .. } = self;
         let report = report::report(&played, &graph, answers, &notes, &robot, timing);
         write_json(&report, file).with_context(|| format!("--report {}", file.display()))
+    }
+}
+
+/// Whoever closes the pipe has read enough.
+fn said(written: std::io::Result<()>) -> Result<()> {
+    match written {
+        Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
+        other => other.context("the summary could not be written"),
     }
 }
 

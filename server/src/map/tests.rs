@@ -213,3 +213,10 @@ fn without_loops_no_edge_is_tried_and_with_wrong_ones_the_map_holds() {
     assert!(worst < 0.3, "{worst}");
     assert!(folder.error(&["--inject-loops", "2"]).contains("share from 0 to 1"));
 }
+
+#[test]
+fn a_closed_pipe_is_no_error() {
+    use std::io::{Error, ErrorKind};
+    assert!(super::said(Err(Error::from(ErrorKind::BrokenPipe))).is_ok());
+    assert!(super::said(Err(Error::from(ErrorKind::StorageFull))).is_err());
+}

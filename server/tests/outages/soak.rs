@@ -40,6 +40,8 @@ async fn soak(server: &Server, map: &str, robot: &str, x_m: impl Fn(u64) -> f64)
     let planner = Planner::new(&session, "default", map, PATIENCE).unwrap();
     planner.save().await.unwrap();
     let places = planner.graph().await.unwrap().places.len();
+    let tenths = |k: usize| memory[k * memory.len() / 10] >> 10;
+    println!("{map}: kB by tenths of the time {:?}", (0..10).map(tenths).collect::<Vec<_>>());
     println!("{map}: {n} messages, {places} places, {} MB at the end", server.memory_bytes() >> 20);
     memory
 }
