@@ -59,7 +59,7 @@ impl FrontEnd {
         local.all_stands = short;
         let searched = Searched { points, local, looks, stood, trust: &trust };
         let (here, dt_s) = (stood.front_from_body, stood.dt_s);
-        let mut guesses = vec![here];
+        let mut guesses = vec![here, stood.by_wheels];
         guesses.extend(trust.goes_on(dt_s).map(|went| here.compose(&Pose2::exp(&went))));
         let mut fits: Vec<Alignment> = guesses.iter().filter_map(|guess| searched.fit(guess)).collect();
         let long = dt_s > LONG_S;
@@ -101,7 +101,8 @@ impl Tried {
 impl Searched<'_> {
     fn expected(&self, pose: &Pose2) -> f64 {
         let moved = self.stood.front_from_body.between(pose);
-        self.trust.log_expects(&moved, self.stood.dt_s, &self.stood.known)
+        let by_wheels = self.stood.front_from_body.between(&self.stood.by_wheels);
+        self.trust.log_expects(&moved, &by_wheels, self.stood.dt_s, &self.stood.known)
     }
 
     fn on(&self, pose: &Pose2) -> f64 {

@@ -102,7 +102,7 @@ impl Trust {
 
     /// Log-density, but for a constant, of a motion if wheels say nothing: the robot goes on as it was last seen to, or
     /// stands, or does anything that robots do. `known`: covariance of where it was.
-    pub fn log_expects(&self, moved: &Pose2, dt_s: f64, known: &Matrix3<f64>) -> f64 {
+    pub fn log_expects(&self, moved: &Pose2, by_wheels: &Pose2, dt_s: f64, known: &Matrix3<f64>) -> f64 {
         let moved = moved.log();
         let density = |from: &Vector3<f64>, d_m: f64, turn_rad: f64| {
             let e = moved - from;
@@ -110,14 +110,16 @@ impl Trust {
                 * normal(e.y, d_m * d_m + known[(1, 1)])
                 * normal(e.z, turn_rad * turn_rad + known[(2, 2)])
         };
-        let on: f64 = self
-            .goes_on(dt_s)
+        let [fast, far] = self.goes_on(dt_s);
+        // Wheels that are wrong are often nearly right.
+        let told = if *by_wheels == Pose2::default() { fast } else { by_wheels.log() };
+        let on: f64 = [fast, far, told]
             .iter()
             .map(|w| density(w, 0.3 * w.xy().norm() + STANDS_M, 0.3 * w.z.abs() + STANDS_M))
             .sum();
         let stands = density(&Vector3::zeros(), STANDS_M, STANDS_M);
         let any = density(&Vector3::zeros(), ANY_M_S * dt_s + LATE_M, ANY_RAD_S * dt_s + LATE_RAD);
-        (0.5 * GOES_ON * on + STANDS * stands + (1.0 - GOES_ON - STANDS) * any).max(f64::MIN_POSITIVE).ln()
+        (GOES_ON / 3.0 * on + STANDS * stands + (1.0 - GOES_ON - STANDS) * any).max(f64::MIN_POSITIVE).ln()
     }
 
     /// Since when scans have not told where it is.
