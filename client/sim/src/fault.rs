@@ -222,7 +222,7 @@ impl Fault {
     }
 
     fn happens(&self, drive: &Drive, draw: &mut Draw) -> Incident {
-        // Drawn first: when it happens depends on how long it lasts for none.
+        // Drawn before the time: recorded tours depend on the order of draws.
         let Some(lasts_s) = self.lasts_s(0.0, drive, draw) else {
             return Incident { fault: *self, from_s: 0.0, to_s: f64::INFINITY };
         };

@@ -4,18 +4,20 @@ use super::{Fault, Incident};
 use crate::laser::{LaserModel, Sweep};
 use crate::random::Draw;
 use crate::world::{Surface, World};
+use std::borrow::Cow;
 use std::f64::consts::PI;
 use toponym_proto::Stamp;
 
 /// The building, with some of its walls of another stuff.
-pub(crate) fn building(world: &World, faults: &[Fault], draw: &mut Draw) -> World {
-    let mut world = world.clone();
+pub(crate) fn building<'a>(world: &'a World, faults: &[Fault], draw: &mut Draw) -> Cow<'a, World> {
+    let mut world = Cow::Borrowed(world);
     for fault in faults {
         let (share, surface) = match *fault {
             Fault::Glass { share } => (share, Surface::Glass),
             Fault::Dark { share } => (share, Surface::Dark),
             _ => continue,
         };
+        let world = world.to_mut();
         world.surfaces.resize(world.walls.len(), Surface::default());
         for of_wall in &mut world.surfaces {
             if draw.chance(share) {

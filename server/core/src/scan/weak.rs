@@ -18,7 +18,7 @@ pub(crate) struct Weak {
     pub(crate) x: f64,
     pub(crate) y: f64,
     /// How weak it is, 0 … 1.
-    pub(crate) share: f64,
+    pub(super) share: f64,
     /// Square of the component along it that noise may give a normal.
     noise2: f64,
 }
@@ -36,7 +36,7 @@ impl Weak {
     }
 
     /// A unit normal less what noise may have given it along the direction; unit again.
-    pub(crate) fn denoised(&self, (a, b): (f64, f64)) -> (f64, f64) {
+    pub(super) fn denoised(&self, (a, b): (f64, f64)) -> (f64, f64) {
         let (along, across) = (a * self.x + b * self.y, b * self.x - a * self.y);
         let kept = along * (1.0 - self.noise2 / (along * along).max(self.noise2));
         let rest = (1.0 - kept * kept).max(0.0).sqrt().copysign(across);
@@ -44,7 +44,7 @@ impl Weak {
     }
 
     /// A normal less its component along the direction, the more the weaker that is.
-    pub(crate) fn damped(&self, (a, b): (f64, f64)) -> (f64, f64) {
+    pub(super) fn damped(&self, (a, b): (f64, f64)) -> (f64, f64) {
         let off = (a * self.x + b * self.y) * self.share;
         (a - off * self.x, b - off * self.y)
     }

@@ -29,9 +29,9 @@ pub(super) struct Looks {
     lag_ns: Option<i64>,
     blind: u32,
     blind_from: Pose2,
-    /// Scans from the first on that would make sense in millimetres; none since one made sense in metres.
-    in_millimetres: Option<u32>,
-    seen_any: bool,
+    /// Scans from the first on that make sense in millimetres alone, and whether one did not.
+    in_millimetres: u32,
+    in_metres: bool,
 }
 
 impl Looks {
@@ -51,23 +51,22 @@ impl Looks {
 
     /// Whether a laser sends millimetres, going by its first scans.
     pub fn sends_millimetres(&mut self, scan: &Scan, range_min_m: f64, range_max_m: f64) -> bool {
-        let sent = self.in_millimetres.unwrap_or(0);
-        if sent >= MILLIMETRE_SCANS || (self.seen_any && self.in_millimetres.is_none()) {
-            return sent >= MILLIMETRE_SCANS;
+        if self.in_metres || self.in_millimetres >= MILLIMETRE_SCANS {
+            return !self.in_metres;
         }
-        self.seen_any = true;
         let mut finite: Vec<f64> =
             scan.ranges_m.iter().filter(|r| r.is_finite()).map(|r| f64::from(*r)).collect();
         if finite.is_empty() {
-            self.seen_any = self.in_millimetres.is_some();
             return false;
         }
         finite.sort_by(f64::total_cmp);
         let within = finite.iter().filter(|r| (range_min_m..range_max_m).contains(&(*r / 1000.0))).count();
         let far = finite.iter().all(|r| *r > range_max_m);
         finite.dedup();
-        let plausible = far && 2 * within > scan.ranges_m.len() / 2 && finite.len() >= MILLIMETRES_UNLIKE;
-        self.in_millimetres = plausible.then_some(sent + 1);
+        // A quarter of all rays is enough: the others may see nothing.
+        let plausible = far && 4 * within > scan.ranges_m.len() && finite.len() >= MILLIMETRES_UNLIKE;
+        self.in_metres = !plausible;
+        self.in_millimetres += u32::from(plausible);
         false
     }
 

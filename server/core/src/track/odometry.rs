@@ -88,7 +88,7 @@ impl Odometry {
     /// nothing.
     fn holds(&mut self, odom: &Odom) -> bool {
         let Some((_, last)) = self.recent.back() else {
-            self.since_ns = odom.stamp_ns;
+            (self.since_ns, self.held) = (odom.stamp_ns, false);
             return false;
         };
         let since_s = odom.stamp_ns.saturating_sub(self.since_ns).max(0) as f64 * 1e-9;

@@ -9,6 +9,8 @@ use nalgebra::{Matrix3, Vector3};
 
 /// Slower wheels, metres or radians a second, do not drive it anywhere.
 const STILL_M_S: f64 = 0.05;
+/// People who carry it walk so many times as far as robots drive.
+const WALK: f64 = 2.0;
 /// Standard deviation of any heading.
 const AROUND_RAD: f64 = 1.8;
 
@@ -41,8 +43,8 @@ impl FrontEnd {
         let frozen = self.freeze(f64::INFINITY);
         let before = self.since_place();
         self.clear_local();
-        let turn_rad = (Trust::may_turn_rad(dt_s) / 1.5).min(AROUND_RAD);
-        let near = Vector3::new(Trust::may_go_m(dt_s), Trust::may_go_m(dt_s), turn_rad);
+        let (d_m, turn_rad) = Trust::anything(dt_s);
+        let near = Vector3::new(WALK * d_m, WALK * d_m, (WALK * turn_rad).min(AROUND_RAD));
         self.since_place = Drift::of(before + Matrix3::from_diagonal(&near.component_mul(&near)));
         frozen
     }

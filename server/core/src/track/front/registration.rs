@@ -23,7 +23,7 @@ const SHARE_MIN: f64 = 0.25;
 /// … and if nothing else does, below this.
 const SHARE_LEAST: f64 = 0.15;
 /// A fit of so much less than usual is suspected to be held where wheels want it, and so much more shows that it is.
-const LESS: f64 = 0.05;
+pub(super) const LESS: f64 = 0.05;
 const MORE: f64 = 0.08;
 /// Where nothing else says that it is near, a fit of so much less is none.
 const FAR_LESS: f64 = 0.15;

@@ -111,14 +111,15 @@ impl Trust {
                 * normal(e.z, turn_rad * turn_rad + known[(2, 2)])
         };
         let [fast, far] = self.goes_on(dt_s);
-        // Wheels that are wrong are often nearly right.
+        // Wheels that are wrong are often nearly right, unless they stand still.
         let told = if *by_wheels == Pose2::default() { fast } else { by_wheels.log() };
         let on: f64 = [fast, far, told]
             .iter()
             .map(|w| density(w, 0.3 * w.xy().norm() + STANDS_M, 0.3 * w.z.abs() + STANDS_M))
             .sum();
         let stands = density(&Vector3::zeros(), STANDS_M, STANDS_M);
-        let any = density(&Vector3::zeros(), ANY_M_S * dt_s + LATE_M, ANY_RAD_S * dt_s + LATE_RAD);
+        let (any_m, any_rad) = Self::anything(dt_s);
+        let any = density(&Vector3::zeros(), any_m, any_rad);
         (GOES_ON / 3.0 * on + STANDS * stands + (1.0 - GOES_ON - STANDS) * any).max(f64::MIN_POSITIVE).ln()
     }
 
@@ -127,14 +128,9 @@ impl Trust {
         self.unseen_s
     }
 
-    /// How far it may have turned meanwhile: three standard deviations.
-    pub fn may_turn_rad(dt_s: f64) -> f64 {
-        3.0 * (ANY_RAD_S * dt_s + LATE_RAD)
-    }
-
-    /// How far it may have gone: two.
-    pub fn may_go_m(dt_s: f64) -> f64 {
-        2.0 * (ANY_M_S * dt_s + LATE_M)
+    /// What a robot of which nothing is known does meanwhile, standard deviations: metres, radians.
+    pub fn anything(dt_s: f64) -> (f64, f64) {
+        (ANY_M_S * dt_s + LATE_M, ANY_RAD_S * dt_s + LATE_RAD)
     }
 
     /// Scans saw a motion, off from that of the wheels by `parted`; `spread`: S.
