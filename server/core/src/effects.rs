@@ -39,6 +39,8 @@ pub enum Suspicion {
     Stale,
     /// Odometry stands still while scans move.
     Still,
+    /// A laser is taken for mounted otherwise than setup says.
+    Mounting,
     /// Scans and wheels contradict each other in the long run.
     Contradiction,
 }

@@ -18,6 +18,7 @@ use crate::scan::align::SIGMA_M;
 use crate::scan::place::Content;
 use crate::scan::sweep::Sweep;
 use crate::track::local::LocalMap;
+use crate::track::mounting::Mismounted;
 use crate::track::places::{Chain, FrozenPlace, OpenPlace, Placed};
 use crate::track::wheels::{Drift, Step, Wheels};
 use nalgebra::{Matrix3, Vector3};
@@ -172,6 +173,12 @@ impl FrontEnd {
     /// Whether odometry stands still while scans move.
     pub fn wheels_stand_still(&self) -> bool {
         self.contrast.stands_still()
+    }
+
+    /// How the laser is mounted, by what wheels and scans say in the long run; none if as it is taken to be, or as long
+    /// as nobody knows where the robot is.
+    pub fn mismounted(&self) -> Option<Mismounted> {
+        self.contrast.mismounted().filter(|_| self.dark.is_none() && !self.broken)
     }
 
     /// How wheels and scans contradict each other in the long run; none if they do not.

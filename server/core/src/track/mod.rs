@@ -9,6 +9,7 @@
 pub mod front;
 mod local;
 mod looks;
+mod mounting;
 pub mod odometry;
 pub mod places;
 mod wheels;
@@ -19,6 +20,7 @@ use crate::geometry::Pose2;
 use crate::scan::sweep::{Sweep, sweep};
 use crate::track::front::FrontEnd;
 use crate::track::looks::Looks;
+use crate::track::mounting::Mounted;
 use crate::track::odometry::{Odometry, Step};
 use crate::track::places::FrozenPlace;
 use serde::{Deserialize, Serialize};
@@ -35,7 +37,7 @@ const WAIT_NS: i64 = 500_000_000;
 pub struct Track {
     /// Its local map and the places not left yet.
     pub front: FrontEnd,
-    lasers: BTreeMap<String, Laser>,
+    lasers: BTreeMap<String, Mounted>,
     odometry: Odometry,
     waiting: VecDeque<Waiting>,
     scans: u64,
@@ -82,7 +84,9 @@ impl Track {
 
     /// Takes its lasers; comes before its first scan and may come again.
     pub fn set_up(&mut self, setup: Setup) {
-        self.lasers = setup.lasers.into_iter().map(|l| (l.id.clone(), l)).collect();
+        let before = std::mem::take(&mut self.lasers);
+        let mounted = |said: Laser| (said.id.clone(), Mounted::new(said.clone(), before.get(&said.id)));
+        self.lasers = setup.lasers.into_iter().map(mounted).collect();
     }
 
     /// Takes odometry. Where it breaks, a new segment begins.
@@ -100,7 +104,7 @@ impl Track {
 
     /// Takes a scan, to wait for its odometry.
     pub fn scan(&mut self, mut scan: Scan, effects: &mut Effects) {
-        if let Some(laser) = self.lasers.get(&scan.laser) {
+        if let Some(laser) = self.lasers.get(&scan.laser).map(Mounted::laser) {
             let looks = self.looks.entry(scan.laser.clone()).or_default();
             if looks.sends_millimetres(&scan, laser.range_min_m, laser.range_max_m) {
                 scan.ranges_m.iter_mut().for_each(|range| *range /= 1000.0);
@@ -145,7 +149,7 @@ impl Track {
             effects.push(Effect::ScanDropped { stamp_ns, reason: "no odometry yet".to_owned() });
             return None;
         };
-        let laser = self.lasers.get(&scan.laser)?;
+        let laser = self.lasers.get(&scan.laser)?.laser();
         let odometry = &self.odometry;
         let motion = |dt_s: f64| {
             odometry
@@ -156,7 +160,7 @@ impl Track {
         let range_max_m = laser.range_max_m;
         self.look(scan, range_max_m, &odom_from_body, &mut seen, effects);
         let placed = self.front.scan(stamp_ns, odom_from_body, seen);
-        self.compare(stamp_ns, effects);
+        let remounted = self.compare(stamp_ns, effects);
         let (place, place_from_body) = (placed.place, placed.place_from_body);
         let scan = self.scans;
         effects.push(Effect::ScanPlaced { scan, stamp_ns, place, place_from_body, odom_from_body });
@@ -165,6 +169,7 @@ impl Track {
             effects.push(Effect::PlaceBegan { place, stamp_ns });
         }
         let places::Placed { began, frozen, new_from_old, .. } = placed;
+        let new_from_old = remounted.map(|r| r.compose(&new_from_old.unwrap_or_default())).or(new_from_old);
         Some(Placed { began, frozen, odom_from_body, new_from_old })
     }
 
@@ -194,21 +199,32 @@ impl Track {
         }
     }
 
-    /// Whether scans and wheels agree in the long run.
-    fn compare(&mut self, stamp_ns: StampNs, effects: &mut Effects) {
+    /// Whether scans and wheels agree in the long run. How the pose in the front end's frame jumps if they do once a
+    /// laser is taken for mounted otherwise.
+    fn compare(&mut self, stamp_ns: StampNs, effects: &mut Effects) -> Option<Pose2> {
+        let mut jump = None;
         if self.odometry.is_stale() {
             let s = self.odometry.period_s();
             self.suspect(stamp_ns, Suspicion::Stale, effects, || {
                 format!("odometry repeats each pose for {s:.1} s: what is between is interpolated")
             });
         }
-        if self.front.wheels_stand_still() {
+        if let Some(mismounted) = self.front.mismounted()
+            // Of several nobody knows which.
+            && let [(laser, mounted)] = &mut self.lasers.iter_mut().collect::<Vec<_>>()[..]
+            && let Some(moved) = mounted.mend(&mismounted)
+        {
+            jump = Some(self.front.remount(&moved));
+            let why = format!("{} Laser {laser:?} is taken for that", mismounted.why());
+            self.suspect(stamp_ns, Suspicion::Mounting, effects, || why);
+        } else if self.front.wheels_stand_still() {
             self.suspect(stamp_ns, Suspicion::Still, effects, || {
                 "odometry stands still while scans move: they alone tell the way".to_owned()
             });
         } else if let Some(why) = self.front.contradiction() {
             self.suspect(stamp_ns, Suspicion::Contradiction, effects, || why);
         }
+        jump
     }
 
     /// Tells of each kind once.

@@ -3,6 +3,7 @@
 mod alike;
 mod asked;
 mod dialogues;
+mod mounted;
 mod standing;
 mod talk;
 mod tour;

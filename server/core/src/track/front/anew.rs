@@ -3,6 +3,7 @@
 use crate::geometry::Pose2;
 use crate::track::front::trust::Trust;
 use crate::track::front::{FrontEnd, LOCAL_PATH_M};
+use crate::track::mounting::{Remounted, mirrored, mirrored_covariance};
 use crate::track::places::FrozenPlace;
 use crate::track::wheels::Drift;
 use nalgebra::{Matrix3, Vector3};
@@ -36,6 +37,33 @@ impl FrontEnd {
         self.clear_local();
         self.since_place = Drift::of(Matrix3::from_diagonal(&Vector3::new(2500.0, 2500.0, 9.0)));
         frozen
+    }
+
+    /// The laser turns out to be mounted otherwise: the body is where that has it. What was mapped in the mirror is
+    /// mirrored back, as far as its places are still open, and the local map begun anew. The body as it is from as it
+    /// was, in the front end's frame.
+    pub(in crate::track) fn remount(&mut self, moved: &Remounted) -> Pose2 {
+        let about = self.open.front().map_or(self.newest_place, |first| {
+            first.front_from_place.compose(&first.chain.previous_from_this.inverse())
+        });
+        self.in_map = Drift::of(moved.covariance(&self.in_map.covariance(&self.wheels)));
+        self.since_place = Drift::of(moved.covariance(&self.since_place()));
+        let before = self.front_from_body;
+        self.front_from_body = moved.body(&before, &about);
+        self.stride_from = self.front_from_body;
+        if moved.is_mirrored() {
+            for place in &mut self.open {
+                place.front_from_place = mirrored(&place.front_from_place, &about);
+                place.chain.previous_from_this = mirrored(&place.chain.previous_from_this, &Pose2::default());
+                place.chain.information = mirrored_covariance(&place.chain.information);
+            }
+            self.newest_place = mirrored(&self.newest_place, &about);
+            self.keys.clear();
+            self.local = None;
+            self.in_map = Drift::default();
+        }
+        (self.wheels, self.trust, self.contrast) = Default::default();
+        self.front_from_body.compose(&before.inverse())
     }
 
     /// A new local map, for what is seen is not what was: somewhere near, as far as people walk.
