@@ -30,6 +30,8 @@ pub struct Sweep {
     pub points: Vec<Point>,
     /// How far the laser saw in each direction.
     pub image: RangeImage,
+    /// The body at the last ray in the body frame at the first, as odometry says.
+    pub moved: Pose2,
 }
 
 /// How far a laser saw, by bearing: the map's free space in 1.4 kB.
@@ -83,6 +85,9 @@ struct Hit {
 /// Makes a sweep of a scan. `motion(dt_s)` is the body's pose `dt_s` after the first ray, in the
 /// body frame at the first ray; it de-skews scans whose `time_increment_s` is not zero.
 pub fn sweep(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Sweep {
+    let beams = scan.ranges_m.len().saturating_sub(1) as f64;
+    let takes_s = scan.time_increment_s.max(0.0) * beams;
+    let moved = if takes_s > 0.0 { motion(takes_s) } else { Pose2::default() };
     let hits = hits(scan, laser, motion);
     let step_rad = scan.angle_increment_rad.abs();
     let image = image(&hits, laser, step_rad);
@@ -94,7 +99,7 @@ pub fn sweep(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Sweep
             Point { x: x as f32, y: y as f32, nx: (c * nx - s * ny) as f32, ny: (s * nx + c * ny) as f32 }
         })
         .collect();
-    Sweep { points, image }
+    Sweep { points, image, moved }
 }
 
 fn hits(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Vec<Hit> {

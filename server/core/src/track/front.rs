@@ -231,7 +231,7 @@ impl FrontEnd {
         if blind && !hold && !self.is_dark() {
             self.go_dark();
         }
-        let began = !hold && self.keep_place(stamp_ns);
+        let began = !hold && self.keep_place(stamp_ns, &self.wheels.blur(&sweep.moved));
         if !blind {
             self.keep_key(sweep);
         }
@@ -325,8 +325,9 @@ impl FrontEnd {
         self.wheels.unseen_m() > VAGUE_PATH_M && (d2 > VAGUE_M.powi(2) || yaw2 > VAGUE_RAD.powi(2))
     }
 
-    /// Begins a place where the last one is far enough behind.
-    fn keep_place(&mut self, stamp_ns: StampNs) -> bool {
+    /// Begins a place where the last one is far enough behind; its frame is off by the `blur` of the scan that it begins
+    /// with.
+    fn keep_place(&mut self, stamp_ns: StampNs, blur: &Matrix3<f64>) -> bool {
         let last = self.open.back();
         if last.is_some_and(|p| self.path_m - p.path_m < self.spacing_m) {
             return false;
@@ -356,7 +357,7 @@ impl FrontEnd {
             chain,
         });
         self.next_place += 1;
-        self.since_place = Drift::of(Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-6, 1e-7)));
+        self.since_place = Drift::of(Matrix3::from_diagonal(&Vector3::new(1e-6, 1e-6, 1e-7)) + blur);
         if in_the_dark {
             self.deal_out(driven + bend);
         }

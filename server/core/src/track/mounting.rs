@@ -159,13 +159,14 @@ mod tests {
             (range_m, bearing_rad) in (0.5..9.0, -PI..PI), e in pose(),
         ) {
             let mut mounted = Mounted::new(laser(mount), None);
-            let seen = |laser: &Laser, bearing_rad: f64| {
-                let (s, c) = bearing_rad.sin_cos();
-                laser.body_from_laser.apply(range_m * c, if laser.upside_down { -range_m * s } else { range_m * s })
+            let seen = |laser: &Laser| {
+                let (s, c) = f64::sin_cos(bearing_rad);
+                let side: f64 = if laser.upside_down { -1.0 } else { 1.0 };
+                laser.body_from_laser.apply(range_m * c, side * range_m * s)
             };
-            let before = seen(mounted.laser(), bearing_rad);
+            let before = seen(mounted.laser());
             let moved = mounted.mend(&Mismounted { turned_rad, upside_down }).unwrap();
-            let after = seen(mounted.laser(), bearing_rad);
+            let after = seen(mounted.laser());
             let in_frame = |body: &Pose2, p: (f64, f64)| {
                 let (x_m, y_m) = body.apply(p.0, p.1);
                 about.inverse().apply(x_m, y_m)

@@ -182,6 +182,15 @@ impl Wheels {
         }
     }
 
+    /// Covariance of a sweep's pose at its first ray, if what it shows is right on average over all of it: a random walk
+    /// W of variance T at its end has averaged T / 3 = Var ∫ W(t) dt.
+    pub fn blur(&self, moved: &Pose2) -> Matrix3<f64> {
+        let (path_m, turned_rad) = (moved.x_m.hypot(moved.y_m), moved.yaw_rad.abs());
+        let d = self.distance.variance(path_m, turned_rad);
+        let yaw = self.yaw.variance(path_m, turned_rad);
+        Matrix3::from_diagonal(&Vector3::new(d, d, yaw)) / 3.0
+    }
+
     /// Path since the scans last told the pose.
     pub fn unseen_m(&self) -> f64 {
         self.unseen_m

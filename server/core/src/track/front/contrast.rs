@@ -184,7 +184,7 @@ mod tests {
             (|p| Pose2::new(-p.x_m, 0.0, p.yaw_rad), Some("180°")),
             (|p| Pose2::new(p.x_m, 0.0, -p.yaw_rad), Some("upside down")),
             (|p| Pose2::new(1000.0 * p.x_m, 0.0, p.yaw_rad), Some("m of each metre")),
-            (|p| Pose2::new(p.x_m, 0.0, 0.1 * p.yaw_rad), Some("rad of each radian")),
+            (|p| Pose2::new(p.x_m, 0.0, 0.2 * p.yaw_rad), Some("rad of each radian")),
             (|_| Pose2::default(), None),
         ];
         for (odom, says) in cases {

@@ -6,6 +6,7 @@ use crate::scan::cloud::{Point, thin};
 use crate::scan::place::VOXEL_M;
 use crate::scan::sweep::Sweep;
 use crate::track::front::FrontEnd;
+use crate::track::front::search::laid_on_surfaces;
 use crate::track::wheels::Drift;
 use nalgebra::{Matrix3, Vector3};
 
@@ -22,9 +23,8 @@ const SHARE_SURE: f64 = 0.6;
 const SHARE_MIN: f64 = 0.25;
 /// … and if nothing else does, below this.
 const SHARE_LEAST: f64 = 0.15;
-/// A fit of so much less than usual is suspected to be held where wheels want it, and so much more shows that it is.
+/// A fit of so much less than usual is suspected to be held where wheels want it.
 pub(super) const LESS: f64 = 0.05;
-const MORE: f64 = 0.08;
 /// Where nothing else says that it is near, a fit of so much less is none.
 const FAR_LESS: f64 = 0.15;
 /// How fast what is usual is learned, per scan.
@@ -97,8 +97,8 @@ impl FrontEnd {
         let mut moved_m = self.wheels.unseen_m() + LOOK_PATH_PER_RAD_M * self.wheels.unseen_rad();
         let is_lost = self.trust.is_lost();
         let per_point = looks_per_point(sweep, &points);
-        let found = if is_lost {
-            self.search(&points, stood, per_point).filter(|f| f.inlier_share >= SHARE_LEAST)
+        let (found, is_rivalled) = if is_lost {
+            (self.search(&points, stood, per_point).filter(|f| f.inlier_share >= SHARE_LEAST), false)
         } else {
             self.near_wheels(&points, &prior, stood, per_point)
         };
@@ -117,14 +117,16 @@ impl FrontEnd {
         self.usual_share += USUAL_GAIN * (found.inlier_share - self.usual_share);
         self.rough_m += ROUGH_GAIN * (found.residual_m - self.rough_m);
         let rough = (self.rough_m / SIGMA_M).powi(2);
-        let look = found.information * (CORRELATED_BEAMS * per_point / rough);
+        let blur = self.wheels.blur(&sweep.moved);
+        let look = blurred(found.information * (CORRELATED_BEAMS * per_point / rough), &blur);
         let map = Matrix3::from_diagonal(&MAP_SIGMAS.component_mul(&MAP_SIGMAS)) * rough;
         let moved = stood.front_from_body.between(&found.target_from_source);
         if is_lost {
             moved_m = moved_m.max(moved.x_m.hypot(moved.y_m) + LOOK_PATH_PER_RAD_M * moved.yaw_rad.abs());
         }
-        let said = found.information * (CORRELATED_BEAMS * per_point / rough) + Matrix3::identity();
-        if let Some(told) = said.try_inverse() {
+        let said = look + Matrix3::identity();
+        // Who is held where wheels want it says nothing for them.
+        if !is_rivalled && let Some(told) = said.try_inverse() {
             let parted = stood.by_wheels.between(&found.target_from_source).log();
             self.trust.saw(&moved, &parted, &(stood.spread + told + map));
         }
@@ -144,22 +146,30 @@ impl FrontEnd {
         }
     }
 
-    /// Where the points fit near what wheels say, or if they moved it that nothing fits there, where it may be at all.
+    /// Where the points fit near what wheels say; or where they may fit at all, if wheels leapt or are less believed than
+    /// that by now. Whether there was a rival that is not believed, either.
     fn near_wheels(
         &mut self,
         points: &[Point],
         prior: &Prior,
         stood: &Stood,
         per_point: f64,
-    ) -> Option<Alignment> {
-        let mut found = self.register(points, prior);
+    ) -> (Option<Alignment>, bool) {
+        let found = self.register(points, prior);
         let leapt = leaps(&stood.front_from_body.between(&self.front_from_body));
-        if leapt || found.is_none_or(|f| f.inlier_share < self.usual_share - LESS) {
-            let least = |f: Alignment| if leapt { f.inlier_share } else { f.inlier_share + MORE };
-            let rival = self.search(points, stood, per_point).filter(|r| r.inlier_share >= SHARE_SURE);
-            found = rival.filter(|r| found.is_none_or(|f| r.inlier_share >= least(f))).or(found);
+        if !leapt && found.is_some_and(|f| f.inlier_share >= self.usual_share - LESS) {
+            return (found, false);
         }
-        found
+        let rival = self.search(points, stood, per_point).filter(|r| r.inlier_share >= SHARE_SURE);
+        let (Some(near), Some(far)) = (found, rival) else { return (rival.or(found), false) };
+        if leapt {
+            return (Some(if far.inlier_share >= near.inlier_share { far } else { near }), false);
+        }
+        let local = self.local();
+        let laid = |at: Alignment| laid_on_surfaces(points, local, &at.target_from_source);
+        let more = laid(far) - laid(near);
+        self.trust.rivalled(per_point * more);
+        if self.trust.is_lost() { (rival, false) } else { (found, true) }
     }
 
     fn register(&mut self, points: &[Point], prior: &Prior) -> Option<Alignment> {
@@ -208,6 +218,12 @@ fn leaps(step: &Pose2) -> bool {
 /// φ by how far scans and wheels part, distance²: of what a few standard deviations explain, nothing.
 fn failed_by(distance2: f64) -> f64 {
     PARTED.iter().rev().find(|(least, _)| distance2 >= *least).map_or(0.0, |(_, failed)| *failed)
+}
+
+/// Information of what is known with one and off by what has a covariance besides, (L⁻¹ + B)⁻¹, L singular in corridors.
+fn blurred(look: Matrix3<f64>, blur: &Matrix3<f64>) -> Matrix3<f64> {
+    let sharp = blur.try_inverse().and_then(|b| (look + b).try_inverse());
+    sharp.map_or(look, |s| look - look * s * look)
 }
 
 /// Independent looks at surfaces that a point stands for, however dense the beams.

@@ -113,7 +113,7 @@ impl Searched<'_> {
     }
 
     fn on(&self, pose: &Pose2) -> f64 {
-        self.looks * laid_on(self.points, self.local, pose, ON_M, ON_GATE_M)
+        self.looks * laid_on_surfaces(self.points, self.local, pose)
     }
 
     fn likely(&self, pose: &Pose2) -> f64 {
@@ -206,6 +206,10 @@ fn rings(here: &Pose2, reach_m: f64) -> impl Iterator<Item = Pose2> {
 }
 
 /// How many of the points lie on surfaces at a pose.
+pub(super) fn laid_on_surfaces(points: &[Point], local: &LocalMap, pose: &Pose2) -> f64 {
+    laid_on(points, local, pose, ON_M, ON_GATE_M)
+}
+
 fn laid_on(points: &[Point], local: &LocalMap, pose: &Pose2, on_m: f64, gate_m: f32) -> f64 {
     let (s, c) = pose.yaw_rad.sin_cos();
     let on = |p: &Point| {

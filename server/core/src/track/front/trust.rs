@@ -22,6 +22,8 @@ const FAILS: f64 = 3e-4;
 const RECOVERS: f64 = 0.1;
 /// Of wheels that are right, so many scans part from them three times as far: people walk by.
 const TAIL: f64 = 0.02;
+/// The best of so many poses away from what wheels say explains more by chance.
+const RIVALS: f64 = 20.0;
 /// What robots do, one standard deviation: speed, and what a scan or two that came late add.
 const SPEED_M_S: f64 = 0.7;
 const SPEED_RAD_S: f64 = 0.7;
@@ -133,6 +135,17 @@ impl Trust {
         (ANY_M_S * dt_s + LATE_M, ANY_RAD_S * dt_s + LATE_RAD)
     }
 
+    /// Where wheels say nothing of it, a scan explains so many independent looks more than near them.
+    pub fn rivalled(&mut self, looks: f64) {
+        let odds = self.wrong / (1.0 - self.wrong) * (looks - RIVALS.ln()).exp();
+        self.believe(odds / (1.0 + odds));
+    }
+
+    /// Neither is ever impossible.
+    fn believe(&mut self, wrong: f64) {
+        self.wrong = wrong.clamp(1e-6, 1.0 - 1e-3);
+    }
+
     /// Scans saw a motion, off from that of the wheels by `parted`; `spread`: S.
     pub fn saw(&mut self, moved: &Pose2, parted: &Vector3<f64>, spread: &Matrix3<f64>) {
         let dt_s = std::mem::take(&mut self.unseen_s);
@@ -150,8 +163,7 @@ impl Trust {
         }
         let sum = self.wrong * wrong + (1.0 - self.wrong) * right;
         if sum > 0.0 {
-            // Neither is ever impossible.
-            self.wrong = (self.wrong * wrong / sum).clamp(1e-6, 1.0 - 1e-3);
+            self.believe(self.wrong * wrong / sum);
         }
     }
 }
@@ -196,6 +208,24 @@ mod tests {
         assert!(trust.is_lost(), "{trust:?}");
         let (motion, _) = trust.pass(0.1, false);
         assert!((motion.x_m - 0.05).abs() < 1e-9, "{motion:?}");
+    }
+
+    #[test]
+    fn what_fits_better_elsewhere_by_chance_makes_no_slip_and_what_does_so_again_does() {
+        let mut trust = Trust::default();
+        for _ in 0..50 {
+            for looks in [4.0, 2.5, 3.0] {
+                trust.pass(0.1, true);
+                trust.rivalled(looks);
+                assert!(!trust.is_lost(), "{trust:?}");
+            }
+            part(&mut trust, 3, 0.003);
+        }
+        for _ in 0..4 {
+            trust.pass(0.1, true);
+            trust.rivalled(6.0);
+        }
+        assert!(trust.is_lost(), "{trust:?}");
     }
 
     #[test]
