@@ -83,6 +83,13 @@ pub struct Scan {
     pub ranges_m: Vec<f32>,
 }
 
+impl Scan {
+    /// Time from the first ray to the last, seconds.
+    pub fn takes_s(&self) -> f64 {
+        self.time_increment_s.max(0.0) * self.ranges_m.len().saturating_sub(1) as f64
+    }
+}
+
 /// A sentence said to the robot.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Utterance {

@@ -85,8 +85,7 @@ struct Hit {
 /// Makes a sweep of a scan. `motion(dt_s)` is the body's pose `dt_s` after the first ray, in the
 /// body frame at the first ray; it de-skews scans whose `time_increment_s` is not zero.
 pub fn sweep(scan: &Scan, laser: &Laser, motion: impl Fn(f64) -> Pose2) -> Sweep {
-    let beams = scan.ranges_m.len().saturating_sub(1) as f64;
-    let takes_s = scan.time_increment_s.max(0.0) * beams;
+    let takes_s = scan.takes_s();
     let moved = if takes_s > 0.0 { motion(takes_s) } else { Pose2::default() };
     let hits = hits(scan, laser, motion);
     let step_rad = scan.angle_increment_rad.abs();

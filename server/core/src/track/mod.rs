@@ -216,6 +216,8 @@ impl Track {
         {
             jump = Some(self.front.remount(&moved));
             let why = format!("{} Laser {laser:?} is taken for that", mismounted.why());
+            // Told again each time: what it is taken for is another mounting now.
+            self.suspected.remove(&Suspicion::Mounting);
             self.suspect(stamp_ns, Suspicion::Mounting, effects, || why);
         } else if self.front.wheels_stand_still() {
             self.suspect(stamp_ns, Suspicion::Still, effects, || {
@@ -248,6 +250,5 @@ impl Track {
 }
 
 fn sweep_end_ns(Waiting { scan, taken_ns }: &Waiting) -> StampNs {
-    let beams = scan.ranges_m.len().saturating_sub(1) as f64;
-    taken_ns.saturating_add((scan.time_increment_s.max(0.0) * beams * 1e9) as i64)
+    taken_ns.saturating_add((scan.takes_s() * 1e9) as i64)
 }

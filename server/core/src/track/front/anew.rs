@@ -46,7 +46,7 @@ impl FrontEnd {
         let about = self.open.front().map_or(self.newest_place, |first| {
             first.front_from_place.compose(&first.chain.previous_from_this.inverse())
         });
-        self.in_map = Drift::of(moved.covariance(&self.in_map.covariance(&self.wheels)));
+        let in_map = moved.covariance(&self.in_map.covariance(&self.wheels));
         self.since_place = Drift::of(moved.covariance(&self.since_place()));
         let before = self.front_from_body;
         self.front_from_body = moved.body(&before, &about);
@@ -61,6 +61,8 @@ impl FrontEnd {
             self.keys.clear();
             self.local = None;
             self.in_map = Drift::default();
+        } else {
+            self.in_map = Drift::of(in_map);
         }
         (self.wheels, self.trust, self.contrast) = Default::default();
         self.front_from_body.compose(&before.inverse())

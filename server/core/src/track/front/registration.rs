@@ -236,3 +236,20 @@ fn surfaces_m(sweep: &Sweep) -> f64 {
     let gap = |p: &[Point]| f64::from((p[0].x - p[1].x).powi(2) + (p[0].y - p[1].y).powi(2)).sqrt();
     sweep.points.windows(2).map(|p| gap(p).min(LOOK_M)).sum()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_blurs_a_look_adds_to_its_covariance_and_says_nothing_where_it_says_nothing() {
+        let blur = Matrix3::from_diagonal(&Vector3::new(4e-4, 4e-4, 1e-4));
+        let look = Matrix3::new(9e3, 1e2, 0.0, 1e2, 4e4, 3e3, 0.0, 3e3, 2e5);
+        let dense = (look.try_inverse().unwrap() + blur).try_inverse().unwrap();
+        assert!((blurred(look, &blur) - dense).norm() < 1e-9 * dense.norm());
+        let across = Matrix3::from_diagonal(&Vector3::new(0.0, 4e4, 2e5));
+        let along = blurred(across, &blur)[(0, 0)];
+        assert!(along.abs() < 1e-9, "{along}");
+        assert_eq!(blurred(look, &Matrix3::zeros()), look, "who stands sees sharply");
+    }
+}

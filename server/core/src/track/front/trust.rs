@@ -8,6 +8,9 @@
 //! p(e | right) = Π_k N(e_k; S_k) with a tail,   p(e | wrong) = Π_k ½ p(e_k | right) + ½ N(e_k; S_k + W_k)
 //! ```
 //!
+//! or, where a scan fits better elsewhere than near wheels and they hold it there all the same, by how many independent
+//! looks more it explains there than the best of many poses does by chance (`rivalled`);
+//!
 //! with S the variances of both together, W what robots can do meanwhile (who slips ahead need not turn), filtered forwards.
 //! While they are more likely wrong than right, the scan is searched for wherever robots may go meanwhile
 //! (`search.rs`). Scans that see nothing say nothing: then what is known of wheels that move decays towards how often

@@ -145,3 +145,23 @@ fn what_long_blind_stretches_claim_is_what_they_are_worth() {
     let (share, mean) = (f64::from(covered) / n as f64, sum / n as f64);
     assert!(share >= 0.88 && (0.6..1.5).contains(&mean), "{share} covered, {mean} of the variance");
 }
+
+#[test]
+fn a_sweep_is_blurred_by_what_wheels_err_on_average_over_it() {
+    let wheels = Wheels::default();
+    let (step, steps) = (Pose2::new(0.002, 0.0, 0.0), 50);
+    let per_step = wheels.yaw.variance(step.x_m, 0.0).sqrt();
+    let average_off = |sweep: u64| {
+        let (mut off, mut sum) = (0.0, 0.0);
+        for k in 0..steps {
+            off += per_step * gauss(sweep, k);
+            sum += off;
+        }
+        sum / steps as f64
+    };
+    let n = 4000;
+    let variance = (0..n).map(|sweep| average_off(sweep).powi(2)).sum::<f64>() / n as f64;
+    let claimed = wheels.blur(&Pose2::new(step.x_m * steps as f64, 0.0, 0.0))[(2, 2)];
+    assert!((0.9..1.15).contains(&(variance / claimed)), "{variance} {claimed}");
+    assert_eq!(wheels.blur(&Pose2::default()), Matrix3::zeros());
+}
