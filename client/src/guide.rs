@@ -1,10 +1,13 @@
 //! The guide's role: says what places are called and hears what became of it.
 //!
 //! A sentence is said again, under its id, until the server has told what became of it: it survives cuts of the
-//! network and restarts of the server, and counts once.
+//! network and restarts of the server, and with [`Guide::keep_in`] ends of the guide's program. It counts once, and where
+//! the robot was when it was said first.
 
+use crate::said::Said;
 use crate::session::ClientError;
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tokio::sync::broadcast::{Receiver, Sender, channel, error::RecvError};
@@ -53,32 +56,56 @@ impl Drop for Guide {
 #[derive(Debug, Default)]
 struct Unheard {
     sentences: VecDeque<Sentence>,
+    /// The same on disk.
+    said: Option<Said>,
 }
 
 #[derive(Debug)]
 struct Sentence {
-    id: String,
     key: String,
-    json: Vec<u8>,
+    say: Say,
+    said_at: Instant,
+    /// How long ago it was said by then.
+    ago: Duration,
     again_at: Instant,
     wait: Duration,
 }
 
+impl Sentence {
+    /// As it is said at `now`: one that began at no known time began so long ago.
+    fn json(&self, now: Instant) -> Option<Vec<u8>> {
+        let ago_s = (self.ago + (now - self.said_at)).as_secs_f64();
+        let ago_s = self.say.ago_s.unwrap_or_default() + ago_s;
+        let is_told = self.say.began.is_none() && ago_s > 0.0;
+        Message::Say(Say { ago_s: is_told.then_some(ago_s), ..self.say.clone() }).to_json().ok()
+    }
+}
+
 impl Unheard {
-    fn add(&mut self, id: &str, key: String, json: Vec<u8>) {
+    /// A sentence said so long ago.
+    fn add(&mut self, key: String, say: Say, ago: Duration) {
         if self.sentences.len() >= UNHEARD_MAX
             && let Some(oldest) = self.sentences.pop_front()
         {
-            warn!(id = oldest.id, "given up: the server tells nothing of too many sentences");
+            warn!(id = oldest.say.id, "given up: the server tells nothing of too many sentences");
+            self.forget(&oldest.say.id);
         }
-        let again_at = Instant::now() + AGAIN;
-        self.sentences.push_back(Sentence { id: id.into(), key, json, again_at, wait: AGAIN });
+        let said_at = Instant::now();
+        let sentence = Sentence { key, say, said_at, ago, again_at: said_at + AGAIN, wait: AGAIN };
+        self.sentences.push_back(sentence);
+    }
+
+    fn forget(&mut self, id: &str) {
+        if let Some(said) = &mut self.said {
+            said.forget(id);
+        }
     }
 
     /// What became of a sentence is known, unless it only waits for its turn.
     fn hear(&mut self, heard: &Heard) {
         if is_final(heard) {
-            self.sentences.retain(|s| s.id != heard.id);
+            self.sentences.retain(|s| s.say.id != heard.id);
+            self.forget(&heard.id);
         }
     }
 
@@ -90,9 +117,9 @@ impl Unheard {
         let again = |sentence: &mut Sentence| {
             sentence.wait = (2 * sentence.wait).min(AGAIN_MAX);
             sentence.again_at = now + sentence.wait;
-            (sentence.key.clone(), sentence.json.clone())
+            Some((sentence.key.clone(), sentence.json(now)?))
         };
-        self.sentences.iter_mut().map(again).collect()
+        self.sentences.iter_mut().filter_map(again).collect()
     }
 }
 
@@ -142,6 +169,31 @@ impl Guide {
             unheard,
             _subscriber: subscriber,
         })
+    }
+
+    /// Keeps sentences in a folder until it is known what became of them, and says again what an earlier guide left
+    /// there; how many those are.
+    ///
+    /// # Errors
+    /// [`ClientError::Spool`]: the medium's.
+    pub async fn keep_in(&self, folder: &Path) -> Result<usize, ClientError> {
+        let (said, left) = Said::open(folder).map_err(ClientError::Spool)?;
+        let again = {
+            let mut unheard = lock(&self.unheard);
+            unheard.said = Some(said);
+            for (say, ago) in left {
+                unheard.add(self.key(&say), say, ago);
+            }
+            unheard.due(Instant::now() + AGAIN)
+        };
+        for (key, json) in &again {
+            put(&self.session, key, json.clone()).await;
+        }
+        Ok(again.len())
+    }
+
+    fn key(&self, say: &Say) -> String {
+        self.keys.say(say.robot.as_deref().or(self.robot.as_deref()))
     }
 
     /// A sentence said now, with a new id.
@@ -202,15 +254,21 @@ impl Guide {
     /// again.
     ///
     /// # Errors
-    /// If the protocol refuses it.
+    /// If the protocol refuses it; if it can't be kept.
     pub async fn publish(&self, say: &Say) -> Result<(), ClientError> {
         let message = Message::Say(say.clone());
         message.validate(&Limits::default())?;
         let json = message
             .to_json()
             .map_err(|e: Refused| ClientError::Unreadable { key: "say".into(), why: e.to_string() })?;
-        let key = self.keys.say(say.robot.as_deref().or(self.robot.as_deref()));
-        lock(&self.unheard).add(&say.id, key.clone(), json.clone());
+        let key = self.key(say);
+        {
+            let mut unheard = lock(&self.unheard);
+            if let Some(said) = &mut unheard.said {
+                said.keep(say).map_err(ClientError::Spool)?;
+            }
+            unheard.add(key.clone(), say.clone(), Duration::ZERO);
+        }
         put(&self.session, &key, json).await;
         Ok(())
     }
@@ -269,7 +327,7 @@ mod tests {
     fn what_is_not_heard_is_said_again_in_order() {
         let (mut unheard, now) = (Unheard::default(), Instant::now());
         for id in ["a", "b", "c"] {
-            unheard.add(id, id.into(), Vec::new());
+            unheard.add(id.into(), Say { id: id.into(), ..Say::default() }, Duration::ZERO);
         }
         let keys = |due: Vec<(String, Vec<u8>)>| due.into_iter().map(|(key, _)| key).collect::<String>();
         assert_eq!(keys(unheard.due(now)), "");
@@ -281,6 +339,18 @@ mod tests {
         unheard.hear(&Heard::new("a", HeardStatus::Asked));
         unheard.hear(&Heard::new("c", HeardStatus::Understood));
         assert!(unheard.sentences.is_empty());
+    }
+
+    #[test]
+    fn what_is_said_again_was_said_a_while_ago() {
+        let (mut unheard, now) = (Unheard::default(), Instant::now());
+        let began = Some(toponym_proto::Stamp { ns: 5 });
+        unheard.add("a".into(), Say { id: "a".into(), ..Say::default() }, Duration::from_secs(100));
+        unheard.add("b".into(), Say { id: "b".into(), began, ..Say::default() }, Duration::ZERO);
+        let due = unheard.due(now + Duration::from_secs(30));
+        let said: Vec<Say> = due.iter().map(|(_, json)| serde_json::from_slice(json).unwrap()).collect();
+        assert!((said[0].ago_s.unwrap() - 130.0).abs() < 1.0, "{said:?}");
+        assert_eq!((said[1].ago_s, said[1].began), (None, began));
     }
 
     #[test]

@@ -369,6 +369,22 @@ mod tests {
     }
 
     #[test]
+    fn how_long_ago_it_was_said_is_told_in_json_alone() {
+        let said =
+            Message::Say(Say { id: "1".into(), text: "hi".into(), ago_s: Some(2.5), ..Default::default() });
+        let decoded = |encoding, bytes: Vec<u8>| {
+            let Message::Say(say) =
+                Message::decode(&Input::Say, encoding, &bytes, &Limits::default()).unwrap()
+            else {
+                panic!("a sentence")
+            };
+            say.ago_s
+        };
+        assert_eq!(decoded(ENCODING_JSON, said.to_json().unwrap()), Some(2.5));
+        assert_eq!(decoded(ENCODING_BINCODE, said.to_bincode().unwrap()), None);
+    }
+
+    #[test]
     fn a_type_on_the_wrong_key_is_refused() {
         let m = Message::Say(Say { id: "1".into(), text: "hi".into(), ..Default::default() });
         let bytes = m.to_bincode().unwrap();

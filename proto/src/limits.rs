@@ -122,6 +122,8 @@ pub const EMPTY_IDLE_S: u64 = 300;
 pub const SEQ_MAX: u64 = 1 << 46;
 /// Times stay within this of the clock's zero, so that the difference of two is never too large.
 pub const STAMP_MAX_NS: i64 = 4_000_000_000_000_000_000;
+/// A sentence said longer ago than this is history.
+pub const AGO_MAX_S: f64 = 7.0 * 86_400.0;
 /// Coordinates stay within this of the origin: an odometry frame that is further off is broken.
 pub const COORDINATE_MAX_M: f64 = 1e6;
 /// Longest range of any laser.

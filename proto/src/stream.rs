@@ -135,9 +135,13 @@ pub struct Say {
     #[serde(default)]
     pub speaker: Option<String>,
     /// When it began, on the clock of the robot's stream; left out: the newest stamp of that
-    /// stream when the sentence arrives.
+    /// stream when the sentence arrives, or had arrived `ago_s` before.
     #[serde(default)]
     pub began: Option<Stamp>,
+    /// How long ago it began, seconds: of who says it again and does not know the robot's clock. Told in JSON alone: what
+    /// is kept has `began`.
+    #[serde(default, with = "in_json")]
+    pub ago_s: Option<f64>,
     /// When it ended.
     #[serde(default)]
     pub ended: Option<Stamp>,
@@ -147,6 +151,23 @@ pub struct Say {
     /// Id of an utterance that something was asked of: this is the answer, "yes" or "no".
     #[serde(default)]
     pub answers: Option<String>,
+}
+
+/// A number that the bincode form leaves out.
+mod in_json {
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(value: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
+        if to.is_human_readable() { value.serialize(to) } else { ().serialize(to) }
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<Option<f64>, D::Error> {
+        if from.is_human_readable() {
+            Option::deserialize(from)
+        } else {
+            <()>::deserialize(from).map(|()| None)
+        }
+    }
 }
 
 impl Say {

@@ -1,7 +1,7 @@
 //! The only place that rejects.
 
 use crate::limits::{
-    ANGLE_MAX_RAD, BOOT_MAX, COORDINATE_MAX_M, Limits, RANGE_MAX_M, SEQ_MAX, STAMP_MAX_NS,
+    AGO_MAX_S, ANGLE_MAX_RAD, BOOT_MAX, COORDINATE_MAX_M, Limits, RANGE_MAX_M, SEQ_MAX, STAMP_MAX_NS,
     TIME_INCREMENT_MAX_S,
 };
 use crate::stream::{Header, Laser, Mend, Message, Pose, Say, Scan, Setup, Stamp};
@@ -152,6 +152,9 @@ fn check_say(say: &Say, limits: &Limits) -> Result<(), Invalid> {
         if let Some(token) = token {
             check_token(field, token)?;
         }
+    }
+    if let Some(ago_s) = say.ago_s {
+        check_number("ago_s", ago_s, 0.0, AGO_MAX_S)?;
     }
     for (field, stamp) in [("began", say.began), ("ended", say.ended)] {
         if let Some(stamp) = stamp {

@@ -203,7 +203,7 @@ impl Fold {
         let beside = bincode::serde::encode_to_vec(&beside, FORMAT)?;
         let mut bytes = (beside.len() as u64).to_le_bytes().to_vec();
         bytes.extend(beside);
-        bytes.extend(self.mapper.save()?);
+        self.mapper.save_to(&mut bytes)?;
         Ok(bytes)
     }
 

@@ -67,6 +67,7 @@ pub fn say() -> Say {
         speaker: Some("anna".into()),
         began: Some(Stamp { ns: 5_000_000_000 }),
         ended: Some(Stamp { ns: 6_500_000_000 }),
+        ago_s: None,
         retracts: Some("s1".into()),
         answers: Some("s2".into()),
     }

@@ -264,6 +264,7 @@ fn say(k: usize, sentence: &Sentence, robot: &str) -> Say {
         speaker: Some("guide".into()),
         began: Some(began),
         ended: Some(Stamp::from_seconds(sentence.ended_s)),
+        ago_s: None,
         retracts: None,
         answers: None,
     }

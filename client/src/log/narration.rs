@@ -145,6 +145,7 @@ fn sentence(line: usize, text: &str) -> Result<Sentence, String> {
         speaker: fields.speaker,
         began: None,
         ended: None,
+        ago_s: None,
         retracts: fields.retracts,
         answers: fields.answers,
     };

@@ -137,7 +137,18 @@ impl Mapper {
 
     /// The whole mapper as bytes.
     pub fn save(&self) -> Result<Vec<u8>, SaveError> {
-        Ok(bincode::serde::encode_to_vec((format_here(), self), bincode::config::standard())?)
+        let mut bytes = Vec::new();
+        self.save_to(&mut bytes)?;
+        Ok(bytes)
+    }
+
+    /// Writes the same behind what is there.
+    ///
+    /// # Errors
+    /// As [`Mapper::save`].
+    pub fn save_to(&self, bytes: &mut Vec<u8>) -> Result<(), SaveError> {
+        bincode::serde::encode_into_std_write((format_here(), self), bytes, bincode::config::standard())?;
+        Ok(())
     }
 
     /// What [`Mapper::save`] wrote.

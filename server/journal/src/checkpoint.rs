@@ -47,10 +47,14 @@ impl Checkpoint {
     /// Writes it; when this returns it is durable.
     pub fn write<D: Disk>(&self, disk: &D) -> Result<(), JournalError> {
         let name = name(self.index);
-        let bytes = self.to_bytes();
         let make = || {
             let mut file = disk.create(NEW, 0)?;
-            file.write_at(0, &bytes)?;
+            let mut at = 0;
+            // Piece by piece: beside the map there is no room for another one.
+            for piece in self.pieces() {
+                file.write_at(at, &piece)?;
+                at += piece.len() as u64;
+            }
             file.sync()?;
             disk.rename(NEW, &name)?;
             disk.sync_names()
@@ -58,16 +62,19 @@ impl Checkpoint {
         make().map_err(JournalError::io(&name))
     }
 
-    fn to_bytes(&self) -> Vec<u8> {
+    /// The file's bytes: head and first frame of the map, its other frames, and how many bytes these are.
+    fn pieces(&self) -> impl Iterator<Item = Vec<u8>> {
         let salt = self.identity.salt();
-        let mut bytes = MAGIC.to_vec();
-        bytes.resize(HEAD_AT, 0);
-        frame::append(&mut bytes, salt, self.index, &serde_json::to_vec(&self.identity).unwrap_or_default());
-        for chunk in self.map.chunks(CHUNK) {
-            frame::append(&mut bytes, salt, self.index, chunk);
-        }
-        frame::append(&mut bytes, salt, self.index, &(self.map.len() as u64).to_le_bytes());
-        bytes
+        let mut head = MAGIC.to_vec();
+        head.resize(HEAD_AT, 0);
+        frame::append(&mut head, salt, self.index, &serde_json::to_vec(&self.identity).unwrap_or_default());
+        let length = (self.map.len() as u64).to_le_bytes();
+        let chunks = self.map.chunks(CHUNK).map(<[u8]>::to_vec).chain([length.to_vec()]);
+        chunks.map(move |chunk| {
+            let mut piece = std::mem::take(&mut head);
+            frame::append(&mut piece, salt, self.index, &chunk);
+            piece
+        })
     }
 
     /// Whether a file with these first bytes is one.
@@ -114,11 +121,11 @@ mod tests {
         let identity = Identity { uuid: "u".into(), build: "b".into(), config: 1, seed: 2 };
         let map: Vec<u8> = (0..CHUNK + 1000).map(|i| (i % 251) as u8).collect();
         let checkpoint = Checkpoint { identity, index: 77, map };
-        let bytes = checkpoint.to_bytes();
+        let bytes = checkpoint.pieces().collect::<Vec<_>>().concat();
         assert_eq!(Checkpoint::read(&name(77), &bytes).unwrap(), checkpoint);
         assert!(Checkpoint::read(&name(78), &bytes).is_err());
         let small = Checkpoint { map: vec![7; 40], ..checkpoint };
-        let bytes = small.to_bytes();
+        let bytes = small.pieces().collect::<Vec<_>>().concat();
         for bit in 0..8 * bytes.len() {
             let mut turned = bytes.clone();
             turned[bit / 8] ^= 1 << (bit % 8);

@@ -290,7 +290,9 @@ impl Intake {
             }
         };
         say.robot = Some(target.clone());
-        let said = self.robots.get_mut(&target).map_or(Ok(()), |mapping| mapping.push_say(say.clone()));
+        let now = self.now();
+        say.ago_s = say.ago_s.map(|ago_s| ago_s + now.saturating_sub(arrived).as_secs_f64());
+        let said = self.robots.get_mut(&target).map_or(Ok(()), |mapping| mapping.push_say(now, say.clone()));
         if let Err(problem) = said {
             self.answer_say(&robot, &say.id, problem);
         }

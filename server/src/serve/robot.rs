@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use toponym_journal::Event;
 use toponym_proto::answer::{ANSWER_VERSION, Ack, Counts, ErrorCode, Problem, RobotState};
 use toponym_proto::sequence::{Patience, Sequencer, Step};
-use toponym_proto::{Message, Say, Setup, Stamp};
+use toponym_proto::{Message, Say, Setup};
 use tracing::{error, info};
 
 use super::board::{MapView, lock};
@@ -16,13 +16,10 @@ use super::mapping::bytes_of;
 use super::maps::Saved;
 use super::scribe::Work;
 use crate::config::ServerConfig;
+use clock::RobotClock;
 
 /// Finds the map that a setup names, or says why the robot can't have it.
 pub type FindMap<'a> = dyn FnMut(&Setup) -> Result<Arc<MapView>, Problem> + 'a;
-
-/// A sentence that began so long before or after all that has arrived of its robot is on another clock. A stream that is
-/// played fast may be minutes behind its sentences.
-const CLOCK_MAX_S: f64 = 900.0;
 
 /// State of one robot's streams.
 pub struct Robot {
@@ -36,9 +33,8 @@ pub struct Robot {
     heard_at: Duration,
     /// Newest boot.
     boot: Option<u64>,
-    /// First and newest stamp of that boot that have arrived; the first is not known of a robot of an earlier run.
-    first: Option<Stamp>,
-    newest: Option<Stamp>,
+    /// Stamps of that boot that have arrived.
+    clock: RobotClock,
     /// (boot, seq) of the last message handed to the map, or given up.
     handed: Option<(u64, u64)>,
     /// The same of those on disk.
@@ -67,8 +63,7 @@ impl Robot {
             sequencer: Sequencer::new(patience, watermark),
             parked: None,
             heard_at: Duration::ZERO,
-            first: None,
-            newest: saved.as_ref().map(|saved| saved.newest),
+            clock: RobotClock::since(saved.as_ref().map(|saved| saved.newest)),
             map: saved.and_then(|saved| saved.map),
             boot: watermark.map(|w| w.0),
             handed: watermark,
@@ -103,11 +98,11 @@ impl Robot {
             if Some(header.boot) > self.boot {
                 // What was wrong with an earlier start says nothing of this one.
                 (self.boot, self.no_map, self.refusal) = (Some(header.boot), None, None);
-                (self.first, self.newest) = (Some(header.stamp), None);
+                self.clock.begin(header.stamp);
             }
             self.notice_restart(&message);
             if Some(header.boot) == self.boot {
-                self.newest = self.newest.max(Some(header.stamp));
+                self.clock.note(now, header.stamp);
             }
         }
         self.sequencer.push(now, message);
@@ -118,7 +113,7 @@ impl Robot {
     fn notice_restart(&mut self, message: &Message) {
         let Message::Setup(Setup { header, .. }) = message else { return };
         let is_used = self.handed.is_some_and(|(boot, seq)| boot == header.boot && header.seq <= seq);
-        if is_used && Some(header.stamp) > self.newest {
+        if is_used && Some(header.stamp) > self.clock.newest() {
             let message = format!("boot {} was used before: what has a used seq is dropped", header.boot);
             error!(robot = self.id, "{message}");
             let hint = "each start of a robot needs a larger boot, such as the Unix time in seconds";
@@ -126,13 +121,16 @@ impl Robot {
         }
     }
 
-    /// Hands a sentence to the map. One without `began` counts as said at the newest stamp that has arrived.
+    /// Hands a sentence to the map that arrived so long ago. One without `began` counts as said at the newest stamp that had
+    /// arrived then, or `ago_s` before.
     ///
     /// # Errors
-    /// If the map can't keep up, or has stopped.
-    pub fn push_say(&mut self, mut say: Say) -> Result<(), Problem> {
-        let began = *say.began.get_or_insert(self.newest.unwrap_or_default());
-        self.check_clock(began)?;
+    /// If it can't be told when it was said; if the map can't keep up, or has stopped.
+    pub fn push_say(&mut self, now: Duration, mut say: Say) -> Result<(), Problem> {
+        if say.began.is_none() {
+            say.began = Some(self.clock.before(now, say.ago_s.unwrap_or_default())?);
+        }
+        self.clock.check(say.began.unwrap_or_default())?;
         let boot = self.boot.unwrap_or_default();
         let stopped = || Problem::new(ErrorCode::Internal, "the map has stopped: see the server's log");
         let busy = || Problem::new(ErrorCode::Busy, "the map can't keep up: say it again later");
@@ -142,22 +140,6 @@ impl Robot {
             Err(TrySendError::Full(_)) => Err(busy()),
             Err(TrySendError::Disconnected(_)) => Err(stopped()),
         }
-    }
-
-    /// Whether a time can be one of this robot's clock.
-    fn check_clock(&self, began: Stamp) -> Result<(), Problem> {
-        let off_s = |from: Stamp, to: Stamp| to.seconds() - from.seconds();
-        let ahead_s = self.newest.map_or(0.0, |newest| off_s(newest, began));
-        let before_s = self.first.map_or(0.0, |first| off_s(began, first));
-        let (s, what) =
-            if ahead_s > before_s { (ahead_s, "after the newest") } else { (before_s, "before the first") };
-        if s <= CLOCK_MAX_S {
-            return Ok(());
-        }
-        let message = format!("began is {s:.0} s {what} stamp of the robot: it is on another clock");
-        Err(Problem::new(ErrorCode::BadArgument, message)
-            .field("began")
-            .hint("leave it out (then it was said now), or take the robot's time from the key time"))
     }
 
     /// Counts a refusal; the newest is told in the robot's state. `place`: (boot, seq), if that could be read.
@@ -308,7 +290,7 @@ impl Robot {
             robot: self.id.clone(),
             map: self.map.as_ref().map(|map| map.id.clone()),
             boot: self.boot,
-            newest: self.newest,
+            newest: self.clock.newest(),
             unused: unused.1,
             senses: self.map.as_ref().map(|map| lock(&map.suspected).clone()).unwrap_or_default(),
             counts: Counts {
@@ -346,5 +328,6 @@ fn hand(map: &MapView, event: Event, backlog_max_bytes: usize) -> Result<(), Try
     })
 }
 
+mod clock;
 #[cfg(test)]
 mod tests;

@@ -9,6 +9,7 @@ mod flood;
 mod journals;
 mod kill;
 mod load;
+mod said;
 mod soak;
 mod spool;
 mod users;

@@ -2,6 +2,7 @@
 
 use super::{Failure, exit};
 use std::fmt::Write as _;
+use std::path::PathBuf;
 use std::time::Duration;
 use toponym::{Connection, Guide, Planner};
 use toponym_proto::Say;
@@ -16,6 +17,7 @@ Examples:
   toponym say 'the lab is past the stairs' --explain
   toponym say 'where is the gym?'
   toponym say 'scratch that'
+  toponym say 'this is the gym' --spool ~/said     nothing is lost if the server is away
 
 It speaks of the place where the robot is now. Exit code 1 if it was not understood, or if the robot asks something
 back: say yes or no, at once or with --answers and the sentence's id.")]
@@ -37,6 +39,9 @@ pub struct SayArgs {
     /// The map for --explain.
     #[arg(long, default_value = "main")]
     map: String,
+    /// Folder to keep the sentence in until it is in the map; what an earlier `say` left there is said again first.
+    #[arg(long, value_name = "DIR")]
+    spool: Option<PathBuf>,
     /// How long to wait for the robot's answer.
     #[arg(long, value_name = "S", default_value = "10", value_parser = super::seconds)]
     timeout: Duration,
@@ -46,6 +51,12 @@ pub async fn say(to: &Connection, site: &str, args: &SayArgs) -> Result<u8, Fail
     let session = to.open().await?;
     let mut guide = Guide::connect(&session, site, args.robot.as_deref()).await?;
     guide.speaker.clone_from(&args.speaker);
+    if let Some(folder) = &args.spool {
+        let left = guide.keep_in(folder).await?;
+        if left > 0 {
+            eprintln!("{left} of earlier sentences are said again");
+        }
+    }
     let say = Say { answers: args.answers.clone(), ..guide.sentence(&args.text) };
     let heard = guide.send(&say, args.timeout).await?;
     println!("{}", heard.words);

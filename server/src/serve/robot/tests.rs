@@ -2,7 +2,7 @@ use super::*;
 use crate::fold::Card;
 use std::sync::mpsc::{Receiver, sync_channel};
 use toponym_core::Mapper;
-use toponym_proto::{Header, Odom, Pose};
+use toponym_proto::{Header, Odom, Pose, Stamp};
 
 const START: Duration = Duration::from_secs(100);
 
@@ -125,7 +125,7 @@ fn a_sentence_without_a_time_is_of_the_newest_stamp_that_has_arrived() {
     let late = Header { stamp: Stamp { ns: 9_000 }, ..header(7) };
     robot.push(START, Message::Odom(Odom { header: late, odom_from_body: Pose::default() }));
     robot.advance(START, false, &mut |_| Ok(view.clone()));
-    robot.push_say(Say { id: "s".into(), ..Say::default() }).unwrap();
+    robot.push_say(START, Say { id: "s".into(), ..Say::default() }).unwrap();
     let said = queue.try_iter().find_map(|work| match work {
         Work::Take(Event::Say { boot, say }) => Some((boot, say.began)),
         _ => None,
@@ -166,11 +166,11 @@ fn a_sentence_of_another_clock_is_refused() {
         Say { id: "s".into(), text: "this is the gym".into(), began, ..Say::default() }
     };
     for (s, words) in [(1_790_000_000, "after the newest"), (100, "before the first")] {
-        let problem = robot.push_say(say(s)).unwrap_err();
+        let problem = robot.push_say(START, say(s)).unwrap_err();
         assert!(problem.message.contains(words) && problem.field.as_deref() == Some("began"), "{problem}");
     }
     for s in [5_000, 5_101, 4_990] {
-        robot.push_say(say(s)).unwrap();
+        robot.push_say(START, say(s)).unwrap();
     }
 }
 
