@@ -6,6 +6,7 @@ use std::collections::{BTreeMap, VecDeque};
 use std::time::Duration;
 
 /// What comes next.
+#[allow(clippy::large_enum_variant, reason = "nearly all are messages: a box would cost each an allocation")]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Step {
     /// The next message.

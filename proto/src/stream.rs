@@ -157,6 +157,7 @@ pub struct Say {
 mod in_json {
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
+    #[allow(clippy::ref_option, reason = "serde passes it so")]
     pub fn serialize<S: Serializer>(value: &Option<f64>, to: S) -> Result<S::Ok, S::Error> {
         if to.is_human_readable() { value.serialize(to) } else { ().serialize(to) }
     }

@@ -34,10 +34,8 @@ pub enum Line<'a> {
 /// A sweep and the poses that its line carries.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScanLine<'a> {
-    /// Bearing of the first beam, laser frame.
-    pub angle_min_rad: f64,
-    /// From beam to beam.
-    pub angle_increment_rad: f64,
+    /// Bearing of the first beam, laser frame, and from beam to beam, radians; none: the line does not say.
+    pub bearings_rad: Option<(f64, f64)>,
     /// The longest range the line itself says the laser can see.
     pub range_max_m: Option<f64>,
     /// As written.
@@ -70,13 +68,10 @@ pub fn parse(line: &str) -> Result<Line<'_>, String> {
 }
 
 fn flaser(mut fields: Fields<'_>) -> Result<Line<'_>, String> {
-    let ranges_m = fields.ranges()?;
-    let (angle_min_rad, angle_increment_rad) = bearings(ranges_m.len());
     Ok(Line::Scan(ScanLine {
-        angle_min_rad,
-        angle_increment_rad,
+        bearings_rad: None,
         range_max_m: None,
-        ranges_m,
+        ranges_m: fields.ranges()?,
         odom_from_laser: fields.pose()?,
         odom_from_body: fields.pose()?,
         stamp: fields.stamp()?,
@@ -96,8 +91,7 @@ fn robotlaser(mut fields: Fields<'_>) -> Result<Line<'_>, String> {
     let (odom_from_laser, odom_from_body) = (fields.pose()?, fields.pose()?);
     fields.skip(5, "velocities and safety distances")?;
     Ok(Line::Scan(ScanLine {
-        angle_min_rad,
-        angle_increment_rad,
+        bearings_rad: Some((angle_min_rad, angle_increment_rad)),
         range_max_m: (range_max_m > 0.0).then_some(range_max_m),
         ranges_m,
         odom_from_laser,
@@ -106,15 +100,16 @@ fn robotlaser(mut fields: Fields<'_>) -> Result<Line<'_>, String> {
     }))
 }
 
-/// First bearing and step of a sweep that doesn't say: SICK's two resolutions over half a circle,
-/// of which 180 and 360 beams leave out the last ray; anything else is spread over it.
-fn bearings(beams: usize) -> (f64, f64) {
-    let step_deg = match beams {
-        180 | 181 => 1.0,
-        360 | 361 => 0.5,
-        n => 180.0 / (n.max(2) - 1) as f64,
-    };
-    (-std::f64::consts::FRAC_PI_2, f64::to_radians(step_deg))
+/// First bearing and step of a sweep that doesn't say, over a field of view symmetric ahead. The last ray is at its end or,
+/// where that makes the rounder step, one short of it: SICK's 180 and 360 beams over half a circle leave it out.
+pub fn bearings(beams: usize, view_rad: f64) -> (f64, f64) {
+    let view_deg = view_rad.to_degrees();
+    let step_deg = |gaps: usize| view_deg / gaps.max(1) as f64;
+    let is_round = |deg: f64| (8.0 * deg - (8.0 * deg).round()).abs() < 1e-6;
+    let full = step_deg(beams.saturating_sub(1));
+    let short = step_deg(beams);
+    let step = if is_round(short) && !is_round(full) { short } else { full };
+    (-0.5 * view_rad, step.to_radians())
 }
 
 /// The exact nanoseconds of a decimal number of seconds; a double would lose some 100 ns of a
@@ -192,6 +187,7 @@ impl<'a> Fields<'a> {
 mod tests {
     use super::*;
     use proptest::prelude::*;
+    use std::f64::consts::PI;
 
     fn scan(line: &str) -> ScanLine<'_> {
         match parse(line).unwrap() {
@@ -214,17 +210,21 @@ mod tests {
         assert_eq!(s.odom_from_laser, Pose { x_m: 0.3, y_m: 0.0, yaw_rad: 0.0 });
         assert_eq!(s.odom_from_body, Pose { x_m: 0.1, y_m: 0.2, yaw_rad: 0.3 });
         assert_eq!(s.stamp, "7.125");
-        assert!((s.angle_increment_rad - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+        assert_eq!(s.bearings_rad, None);
     }
 
     #[test]
     fn beam_counts_tell_the_bearings() {
         let half = -std::f64::consts::FRAC_PI_2;
         for (beams, step_deg) in [(180, 1.0), (181, 1.0), (360, 0.5), (361, 0.5), (91, 2.0)] {
-            let (first, step) = bearings(beams);
+            let (first, step) = bearings(beams, PI);
             assert!((first - half).abs() < 1e-12 && (step.to_degrees() - step_deg).abs() < 1e-12);
         }
-        assert!(bearings(1).1.is_finite());
+        for beams in [1080, 1081] {
+            let (first, step) = bearings(beams, 1.5 * PI);
+            assert!((first + 0.75 * PI).abs() < 1e-12 && (step.to_degrees() - 0.25).abs() < 1e-12);
+        }
+        assert!(bearings(1, PI).1.is_finite());
     }
 
     #[test]
@@ -233,7 +233,7 @@ mod tests {
         for remissions in ["0", "2 10 20"] {
             let line = format!("{head} {remissions} 1 2 0.5 0.8 2 0.5 0.1 0.2 1 1 0 42.5 robot 43");
             let s = scan(&line);
-            assert_eq!((s.angle_min_rad, s.angle_increment_rad, s.range_max_m), (-2.0, 0.1, Some(5.6)));
+            assert_eq!((s.bearings_rad, s.range_max_m), (Some((-2.0, 0.1)), Some(5.6)));
             assert_eq!(s.odom_from_laser, Pose { x_m: 1.0, y_m: 2.0, yaw_rad: 0.5 });
             assert_eq!(s.odom_from_body, Pose { x_m: 0.8, y_m: 2.0, yaw_rad: 0.5 });
             assert_eq!(s.stamp, "42.5");

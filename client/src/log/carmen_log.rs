@@ -3,6 +3,7 @@
 use super::carmen::{self, Line, ScanLine};
 use super::{LogError, LogRecord, Notes, Options, Records};
 use std::collections::VecDeque;
+use std::f64::consts::{PI, TAU};
 use toponym_proto::stream::Laser;
 use toponym_proto::{Clock, Header, Limits, Message, Odom, Pose, Scan, Setup, Stamp};
 
@@ -25,6 +26,8 @@ pub struct CarmenLog {
     line: usize,
     options: Options,
     range_max_m: f64,
+    /// Field of view of sweeps that don't say.
+    view_rad: f64,
     /// The log has `ODOM` lines: these are the trajectory's rows, not the scans'.
     has_odom: bool,
     last_odom: Option<(Pose, Stamp)>,
@@ -50,6 +53,7 @@ impl CarmenLog {
             line: 0,
             options: options.clone(),
             range_max_m: survey.range_max_m,
+            view_rad: survey.view_rad,
             has_odom: survey.has_odom,
             last_odom: None,
             seq: 0,
@@ -93,7 +97,8 @@ impl CarmenLog {
         let brings_odom = self.last_odom != Some((scan.odom_from_body, stamp));
         let (odom_from_body, text) = (scan.odom_from_body, scan.stamp);
         // First of all: of a bad line not even the odometry is taken.
-        let message = sweep(scan, self.header(u64::from(brings_odom), stamp), self.range_max_m)?;
+        let message =
+            sweep(scan, self.header(u64::from(brings_odom), stamp), self.range_max_m, self.view_rad)?;
         if brings_odom {
             self.odom(odom_from_body, text, !self.has_odom)?;
         }
@@ -121,15 +126,17 @@ impl CarmenLog {
 }
 
 /// A line's sweep, checked.
-fn sweep(scan: ScanLine<'_>, header: Header, range_max_m: f64) -> Result<Message, String> {
+fn sweep(scan: ScanLine<'_>, header: Header, range_max_m: f64, view_rad: f64) -> Result<Message, String> {
+    let (angle_min_rad, angle_increment_rad) =
+        scan.bearings_rad.unwrap_or_else(|| carmen::bearings(scan.ranges_m.len(), view_rad));
     let beyond = range_max_m as f32;
     let mut ranges_m = scan.ranges_m;
     ranges_m.iter_mut().filter(|r| **r >= beyond).for_each(|r| *r = f32::INFINITY);
     let message = Message::Scan(Scan {
         header,
         laser: LASER.into(),
-        angle_min_rad: scan.angle_min_rad,
-        angle_increment_rad: scan.angle_increment_rad,
+        angle_min_rad,
+        angle_increment_rad,
         time_increment_s: 0.0,
         ranges_m,
     });
@@ -196,19 +203,21 @@ struct Survey {
     first_stamp_text: String,
     has_odom: bool,
     range_max_m: f64,
+    view_rad: f64,
     laser: Laser,
 }
 
 impl Survey {
     /// Fails with the number of lines and the first thing wrong if there is no usable scan.
     fn of(text: &[u8]) -> Result<Self, (usize, Option<String>)> {
-        let (mut at, mut lines, mut has_odom, mut wrong) = (0, 0, false, None);
-        let (mut offset_m, mut param_max_m, mut first_stamp) = (None, None, None);
+        let (mut at, mut lines, mut raw, mut has_odom, mut wrong) = (0, 0, 0, false, None);
+        let (mut offset_m, mut param_max_m, mut view_rad, mut first_stamp) = (None, None, PI, None);
         let (mut first, mut last_at) = (None, None);
         while at < text.len() {
             let (line, _, next) = line_at(text, at);
             lines += 1;
             let line = line.unwrap_or("");
+            raw += usize::from(line.starts_with("RAWLASER"));
             let is_scan = line.starts_with("FLASER") || line.starts_with("ROBOTLASER1");
             has_odom |= line.starts_with("ODOM");
             if is_scan && first.is_some() {
@@ -224,14 +233,25 @@ impl Survey {
                         Err(why) => wrong = wrong.or(Some(format!("line {lines}: {why}"))),
                     },
                     Ok(Line::Param { name: "robot_frontlaser_offset", value }) => offset_m = Some(value),
-                    Ok(Line::Param { name: "robot_front_laser_max", value }) => param_max_m = Some(value),
+                    Ok(Line::Param {
+                        name: "robot_front_laser_max" | "laser_front_laser_max_range",
+                        value,
+                    }) => param_max_m = Some(param_max_m.map_or(value, |max: f64| max.min(value))),
+                    Ok(Line::Param { name: "laser_front_laser_fov", value }) if value > 0.0 => {
+                        // Written in degrees; a view is no more than a circle.
+                        view_rad = if value > TAU { value.to_radians() } else { value }.min(TAU);
+                    }
                     Ok(_) => {}
                     Err(why) => wrong = wrong.or(Some(format!("line {lines}: {why}"))),
                 }
             }
             at = next;
         }
-        let (Some(first), Some(stamp)) = (first, first_stamp) else { return Err((lines, wrong)) };
+        let (Some(first), Some(stamp)) = (first, first_stamp) else {
+            let told =
+                format!("{raw} lines are RAWLASER: sweeps without the robot's pose, which are not read");
+            return Err((lines, wrong.or((raw > 0).then_some(told))));
+        };
         let last = last_at.and_then(|at| line_at(text, at).0.ok()).map(carmen::parse);
         let last = if let Some(Ok(Line::Scan(scan))) = &last { scan } else { &first };
         let mounting = offset_m.map_or_else(|| mounting(&first, last), |x_m| Pose { x_m, ..Pose::default() });
@@ -242,6 +262,7 @@ impl Survey {
             first_stamp_text: stamp.to_owned(),
             has_odom,
             range_max_m,
+            view_rad,
             laser: laser(mounting, range_max_m),
         })
     }
@@ -252,7 +273,7 @@ fn usable(scan: &ScanLine<'_>) -> Result<(), String> {
     let Options { robot, boot, .. } = Options::default();
     let header = Header { robot, boot, seq: 1, stamp: carmen::stamp(scan.stamp)?, clock: Clock::Log };
     check(&Message::Odom(Odom { header: header.clone(), odom_from_body: scan.odom_from_body }))?;
-    sweep(scan.clone(), header, RANGE_MAX_M).map(drop)
+    sweep(scan.clone(), header, RANGE_MAX_M, PI).map(drop)
 }
 
 fn laser(body_from_laser: Pose, range_max_m: f64) -> Laser {

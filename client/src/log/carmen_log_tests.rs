@@ -162,3 +162,26 @@ fn no_scan_is_an_error_that_names_file_and_line() {
     let error = CarmenLog::new(text, &Options::default(), notes).unwrap_err().to_string();
     assert!(error.starts_with("a.log: no usable scan in 2 lines; line 2: "), "{error}");
 }
+
+#[test]
+fn raw_sweeps_alone_are_told() {
+    let text = b"RAWLASER1 0 -1.57 3.14 0.0174 81 0.01 0 1 1 0 1 h 1\n".to_vec();
+    let error = CarmenLog::new(text, &Options::default(), Notes::default()).unwrap_err().to_string();
+    assert!(error.contains("1 lines are RAWLASER"), "{error}");
+}
+
+#[test]
+fn parameters_tell_the_view_and_how_far_it_sees() {
+    let scan = "FLASER 4 1 2 31 3 0 0 0 0 0 0 1 h 1\n";
+    for view in ["270", "4.712388980384690"] {
+        let params = format!(
+            "PARAM laser_front_laser_fov {view} 1 h 1\nPARAM laser_front_laser_max_range 30 1 h 1\n\
+             PARAM robot_front_laser_max 40 1 h 1\n"
+        );
+        let (records, _) = read(&format!("{params}{scan}"));
+        let Message::Scan(scan) = &records.last().unwrap().message else { panic!("a scan") };
+        assert!((scan.angle_min_rad.to_degrees() + 135.0).abs() < 1e-6, "{scan:?}");
+        assert!((scan.angle_increment_rad.to_degrees() - 90.0).abs() < 1e-6, "{scan:?}");
+        assert_eq!(scan.ranges_m, [1.0, 2.0, f32::INFINITY, 3.0]);
+    }
+}

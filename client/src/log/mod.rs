@@ -79,6 +79,8 @@ pub struct Notes {
     pub first_bad: Vec<(usize, String)>,
     /// Lines of other types: type and number.
     pub ignored: BTreeMap<String, u64>,
+    /// Sentences left out, for they began far outside the log.
+    pub outside: u64,
     /// Whatever else the reader of a report should know ("truncated").
     pub remarks: Vec<String>,
 }
@@ -106,6 +108,22 @@ impl Notes {
         }
     }
 
+    /// Why a log that was read to its end is not what it was taken for.
+    ///
+    /// # Errors
+    /// If more of it was skipped than read; if no sentence was said during the log.
+    pub fn check(&self) -> Result<(), Misread> {
+        let file = self.file.clone();
+        let read = self.scans + self.odoms;
+        if self.bad_lines > read {
+            return Err(Misread::Skipped { file, skipped: self.bad_lines, read });
+        }
+        if self.outside > 0 && self.sentences == 0 {
+            return Err(Misread::Outside { file, sentences: self.outside });
+        }
+        Ok(())
+    }
+
     /// Warnings for people, one a line; each begins with the file's name.
     pub fn warnings(&self) -> Vec<String> {
         let file = self.file.display();
@@ -124,6 +142,32 @@ impl Notes {
         }
         out
     }
+}
+
+/// Why a log that was read is not what it was taken for.
+#[derive(Debug, Error)]
+pub enum Misread {
+    /// Most of it is something else.
+    #[error("{file}: {skipped} lines were skipped and {read} read: this is not the log it was taken for")]
+    Skipped {
+        /// The file.
+        file: PathBuf,
+        /// Lines skipped.
+        skipped: u64,
+        /// Scans and odometry read.
+        read: u64,
+    },
+    /// The narration is of another log.
+    #[error(
+        "{file}: all {sentences} sentences of the narration began far outside the log: t is the log's own stamp, t_rel \
+         counts from its first, both in seconds"
+    )]
+    Outside {
+        /// The file.
+        file: PathBuf,
+        /// Sentences.
+        sentences: u64,
+    },
 }
 
 /// Why a log can't be read at all.

@@ -17,6 +17,9 @@ use toponym_proto::merge::{Sentences, order_stamp};
 use toponym_proto::stream::Hearing;
 use toponym_proto::{Limits, Message, Say, Stamp};
 
+/// A sentence that began so long before or after the log is on another clock.
+const OUTSIDE_S: f64 = 900.0;
+
 /// Why a narration can't be used. Unlike a log's a bad line is an error: a person wrote it and
 /// can mend it, and the map would silently lack a name.
 #[derive(Debug, Error)]
@@ -134,7 +137,7 @@ fn sentence(line: usize, text: &str) -> Result<Sentence, String> {
         (None, Some(t)) if t.abs() < 9e9 => Began::After(ns(t)),
         (None, None) => return Err("says neither t nor t_rel".into()),
         (Some(_), Some(_)) => return Err("says both t and t_rel".into()),
-        _ => return Err("its time is out of range".into()),
+        _ => return Err("its time is out of range: t and t_rel are in seconds".into()),
     };
     let say = Say {
         id: fields.id.unwrap_or_else(|| line_id(line, text)),
@@ -176,9 +179,17 @@ pub fn merged(mut log: Box<dyn Records>, narration: &Narration) -> Box<dyn Recor
     let header = next.as_ref().and_then(|r| r.message.header());
     let (robot, first) = header.map_or((String::new(), Stamp::default()), |h| (h.robot.clone(), h.stamp));
     let mut says = Sentences::default();
-    narration.says(&robot, first).into_iter().for_each(|say| says.push(say, first));
+    let (before, rest): (Vec<Say>, Vec<Say>) =
+        narration.says(&robot, first).into_iter().partition(|say| began_s(say) < first.seconds() - OUTSIDE_S);
+    for say in rest {
+        says.push(say, first);
+    }
     let notes = log.notes().clone();
-    Box::new(Merged { log, next, says, said: 0, notes })
+    Box::new(Merged { log, next, says, said: 0, newest: first, outside: before, notes })
+}
+
+fn began_s(say: &Say) -> f64 {
+    say.began.unwrap_or_default().seconds()
 }
 
 struct Merged {
@@ -186,7 +197,38 @@ struct Merged {
     next: Option<LogRecord>,
     says: Sentences,
     said: u64,
+    /// Newest stamp of the log so far.
+    newest: Stamp,
+    /// Sentences left out.
+    outside: Vec<Say>,
     notes: Notes,
+}
+
+impl Merged {
+    /// The next sentence that nothing of the log is later than. One far behind its end is of another clock.
+    fn left(&mut self) -> Option<Say> {
+        loop {
+            let say = self.says.pop()?;
+            if began_s(&say) <= self.newest.seconds() + OUTSIDE_S {
+                return Some(say);
+            }
+            self.outside.push(say);
+        }
+    }
+
+    /// The log's own notes are one message ahead, so these are counted when it is handed out.
+    fn note(&mut self) {
+        self.notes.clone_from(self.log.notes());
+        self.notes.sentences += self.said;
+        self.notes.outside = self.outside.len() as u64;
+        if let Some(say) = self.outside.first() {
+            let n = self.outside.len();
+            self.notes.remark(format!(
+                "{n} sentences left out, such as {:?}: they began far outside the log, on another clock",
+                say.text
+            ));
+        }
+    }
 }
 
 impl Iterator for Merged {
@@ -194,8 +236,11 @@ impl Iterator for Merged {
 
     fn next(&mut self) -> Option<LogRecord> {
         let say = match &self.next {
-            Some(record) => self.says.pop_before(order_stamp(&record.message)),
-            None => self.says.pop(),
+            Some(record) => {
+                self.newest = self.newest.max(record.message.header().map_or(self.newest, |h| h.stamp));
+                self.says.pop_before(order_stamp(&record.message))
+            }
+            None => self.left(),
         };
         let record = if let Some(say) = say {
             self.said += 1;
@@ -204,9 +249,7 @@ impl Iterator for Merged {
         } else {
             std::mem::replace(&mut self.next, self.log.next())
         };
-        // Counted when handed out; the log's own notes are one message ahead.
-        self.notes.clone_from(self.log.notes());
-        self.notes.sentences += self.said;
+        self.note();
         record
     }
 }
@@ -253,6 +296,25 @@ mod tests {
         // The step back to 10.5 doesn't count: 11 had come before.
         assert_eq!(order(r#"{"t": 11, "text": "A"}"#), "SoLoLoLA");
         assert_eq!(order("{\"t_rel\": 99, \"text\": \"B\"}\n{\"t_rel\": 0.5, \"text\": \"A\"}"), "SoLAoLoLB");
+    }
+
+    #[test]
+    fn what_was_said_far_outside_the_log_is_left_out_and_told() {
+        let told = |narration: &str| {
+            let mut log = merged(log(), &Narration::parse(narration).unwrap());
+            let said = log.by_ref().filter(|r| matches!(r.message, Message::Say(_))).count();
+            (said, log.notes().clone())
+        };
+        let (said, notes) = told("{\"t\": 1790000000, \"text\": \"A\"}\n{\"t\": 10.5, \"text\": \"B\"}");
+        assert_eq!((said, notes.outside), (1, 1));
+        assert!(notes.warnings()[0].contains("1 sentences left out, such as \"A\""), "{notes:?}");
+        assert!(notes.check().is_ok());
+        let (said, notes) = told("{\"t_rel\": 10500, \"text\": \"A\"}\n{\"t\": -5000, \"text\": \"B\"}");
+        assert_eq!((said, notes.outside), (0, 2));
+        assert!(notes.check().unwrap_err().to_string().contains("all 2 sentences"));
+        assert!(
+            Narration::parse("{\"t\": 976052857337, \"text\": \"a\"}").unwrap_err().1.contains("in seconds")
+        );
     }
 
     #[test]

@@ -49,7 +49,9 @@ pub fn run(args: &MapArgs) -> Result<()> {
     let finished = pool.install(|| play(log, mapper, args))?;
     finished.notes.warnings().iter().for_each(|w| eprintln!("warning: {w}"));
     finished.played.suspicions.iter().for_each(|(_, _, why)| eprintln!("warning: {why}"));
-    finished.write(args)
+    let checked = finished.notes.check();
+    finished.write(args)?;
+    Ok(checked?)
 }
 
 fn load(file: &Path) -> Result<Mapper> {

@@ -1,6 +1,6 @@
 //! A network that is cut, stalls, and comes back: nothing is lost.
 //!
-//! `TOPONYM_CUT_S` sets how long it is away (2).
+//! `TOPONYM_CUT_S` sets how long it is away (2), `TOPONYM_SCENES` how many scenes are drawn (1), by `TOPONYM_SEED`.
 
 use crate::drive::{Drive, Server, setting};
 use rand::{RngExt as _, SeedableRng as _};
@@ -154,4 +154,29 @@ async fn a_half_open_connection_loses_nothing() {
 #[tokio::test(flavor = "multi_thread")]
 async fn a_lossy_line_loses_nothing() {
     nothing_is_lost(&[(Line::Lossy(1), away()), (Line::Lossy(10), away()), (Line::Lossy(30), away())]).await;
+}
+
+/// Up to four stretches of any kind, each up to twice as long as a cut.
+fn drawn(random: &mut ChaCha8Rng) -> Vec<(Line, Duration)> {
+    let stretch = |random: &mut ChaCha8Rng| {
+        let line = match random.random_range(0..6) {
+            0 => Line::Cut,
+            1 => Line::Stalled,
+            2 => Line::Deaf,
+            3 => Line::Open,
+            _ => Line::Lossy([1, 10, 30][random.random_range(0..3)]),
+        };
+        (line, away().mul_f64(random.random_range(0.05..2.0)))
+    };
+    (0..random.random_range(1..=4)).map(|_| stretch(random)).collect()
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn drawn_scenes_lose_nothing() {
+    for k in 0..setting("TOPONYM_SCENES", 1) {
+        let seed = setting("TOPONYM_SEED", 1) + k;
+        let scene = drawn(&mut ChaCha8Rng::seed_from_u64(seed));
+        println!("scene {seed}: {scene:?}");
+        nothing_is_lost(&scene).await;
+    }
 }

@@ -130,6 +130,8 @@ enum Failure {
     #[error(transparent)]
     Log(#[from] toponym::log::LogError),
     #[error(transparent)]
+    Misread(#[from] toponym::log::Misread),
+    #[error(transparent)]
     Narration(#[from] toponym::log::NarrationError),
     #[error(transparent)]
     Simulate(#[from] toponym_sim::args::SimulateError),
@@ -151,6 +153,7 @@ impl Failure {
             }
             Self::Client(ClientError::Invalid(_) | ClientError::Spool(_))
             | Self::Log(_)
+            | Self::Misread(_)
             | Self::Narration(_)
             | Self::Simulate(_)
             | Self::Output(_) => exit::USAGE,

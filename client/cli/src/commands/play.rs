@@ -78,6 +78,7 @@ pub async fn replay(to: &Connection, site: &str, args: &ReplayArgs) -> Result<u8
     log.notes().warnings().iter().for_each(|warning| eprintln!("warning: {warning}"));
     let played = played?;
     println!("{}", summary(&played, boot, begin.elapsed()));
+    log.notes().check()?;
     match played.ack.map_or(0, |ack| ack.lost) {
         0 if played.heard < played.sentences => Err(Failure::Unheard(played.sentences - played.heard)),
         0 => Ok(exit::FOUND),

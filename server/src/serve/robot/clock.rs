@@ -75,9 +75,9 @@ impl RobotClock {
             || Problem::new(ErrorCode::Busy, "the robot's clock is not known yet: say it again later");
         let (at, stamp) = self.noted.back().ok_or_else(not_known)?;
         let is_live = |(from, was): &(Duration, Stamp)| {
-            LIVE.contains(&((stamp.seconds() - was.seconds()) / (*at - *from).as_secs_f64()))
+            LIVE.contains(&((stamp.seconds() - was.seconds()) / at.saturating_sub(*from).as_secs_f64()))
         };
-        let from = self.noted.iter().rev().find(|(from, _)| *at - *from >= LIVE_OVER);
+        let from = self.noted.iter().rev().find(|(from, _)| at.saturating_sub(*from) >= LIVE_OVER);
         if !from.is_some_and(is_live) {
             return Err(not_known());
         }
