@@ -198,13 +198,7 @@ impl Guide {
 
     /// A sentence said now, with a new id.
     pub fn sentence(&self, text: &str) -> Say {
-        Say {
-            id: ulid::Ulid::generate().to_string(),
-            robot: self.robot.clone(),
-            text: text.into(),
-            speaker: self.speaker.clone(),
-            ..Say::default()
-        }
+        Say { robot: self.robot.clone(), speaker: self.speaker.clone(), ..sentence(text) }
     }
 
     /// Says something and waits for what became of it: understood or not, it is an answer.
@@ -282,6 +276,11 @@ impl Guide {
     pub fn feedback(&self) -> Receiver<Heard> {
         self.feedback.subscribe()
     }
+}
+
+/// A sentence with a new id.
+pub fn sentence(text: &str) -> Say {
+    Say { id: ulid::Ulid::generate().to_string(), text: text.into(), ..Say::default() }
 }
 
 /// Why there is no answer yet, with what is known.

@@ -25,7 +25,7 @@ pub mod log;
 pub mod planner;
 pub mod replay;
 pub mod robot;
-mod said;
+pub mod said;
 pub mod session;
 pub mod spool;
 

@@ -129,6 +129,9 @@ fn times_whose_difference_would_overflow_are_named() {
         assert_eq!(refused(&Message::Say(Say { began: stamp, ..say() })), "began");
         assert_eq!(refused(&Message::Say(Say { ended: stamp, ..say() })), "ended");
     }
+    for ago_s in [-1.0, f64::NAN, f64::INFINITY, 1e9] {
+        assert_eq!(refused(&Message::Say(Say { ago_s: Some(ago_s), ..say() })), "ago_s");
+    }
     for ns in [STAMP_MAX_NS, -STAMP_MAX_NS] {
         odom(ns).validate(&Limits::default()).unwrap();
     }

@@ -4,7 +4,9 @@ use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
-use toponym::{Connection, Guide, Planner};
+use toponym::guide::sentence;
+use toponym::said::Said;
+use toponym::{ClientError, Connection, Guide, Planner};
 use toponym_proto::Say;
 use toponym_proto::answer::{GraphReply, Heard, HeardStatus};
 
@@ -48,18 +50,33 @@ pub struct SayArgs {
 }
 
 pub async fn say(to: &Connection, site: &str, args: &SayArgs) -> Result<u8, Failure> {
-    let session = to.open().await?;
-    let mut guide = Guide::connect(&session, site, args.robot.as_deref()).await?;
-    guide.speaker.clone_from(&args.speaker);
+    let say = Say {
+        robot: args.robot.clone(),
+        speaker: args.speaker.clone(),
+        answers: args.answers.clone(),
+        ..sentence(&args.text)
+    };
+    let opened = to.open().await;
+    if opened.is_err()
+        && let Some(folder) = &args.spool
+    {
+        let (mut said, _) = Said::open(folder).map_err(ClientError::Spool)?;
+        said.keep(&say).map_err(ClientError::Spool)?;
+        eprintln!("kept in {}: the next `say --spool` says it", folder.display());
+    }
+    let session = opened?;
+    let guide = Guide::connect(&session, site, args.robot.as_deref()).await?;
     if let Some(folder) = &args.spool {
         let left = guide.keep_in(folder).await?;
         if left > 0 {
             eprintln!("{left} of earlier sentences are said again");
         }
     }
-    let say = Say { answers: args.answers.clone(), ..guide.sentence(&args.text) };
     let heard = guide.send(&say, args.timeout).await?;
     println!("{}", heard.words);
+    if let (waiting @ 1.., Some(folder)) = (guide.unheard(), &args.spool) {
+        eprintln!("{waiting} earlier sentences stay in {}: nothing is heard of them yet", folder.display());
+    }
     if heard.status == HeardStatus::Asked {
         println!("Answer with: toponym say yes --answers {}   (or no)", heard.id);
     }
@@ -118,5 +135,27 @@ mod tests {
             "sentence  01J\nread as   loc(lab,past,stairs)\nput at    place 7 (x 1.00 m, y -2.00 m): 0.60\n\
              \x20         elsewhere or not seen yet: 0.40\n"
         );
+    }
+
+    #[tokio::test(flavor = "multi_thread")]
+    async fn a_sentence_that_nobody_hears_is_kept() {
+        let folder = std::env::temp_dir().join(format!("toponym-kept-{}", std::process::id()));
+        let args = SayArgs {
+            text: "this is the gym".into(),
+            robot: None,
+            speaker: None,
+            answers: None,
+            explain: false,
+            map: "main".into(),
+            spool: Some(folder.clone()),
+            timeout: Duration::from_secs(1),
+        };
+        // Nothing listens on a port that was free a moment ago.
+        let port = std::net::TcpListener::bind("127.0.0.1:0").unwrap().local_addr().unwrap().port();
+        let nobody = Connection::to(&format!("tcp/127.0.0.1:{port}"));
+        assert!(say(&nobody, "default", &args).await.is_err());
+        let (_, left) = Said::open(&folder).unwrap();
+        assert_eq!(left[0].0.text, "this is the gym");
+        std::fs::remove_dir_all(folder).unwrap();
     }
 }
