@@ -121,16 +121,16 @@ impl Robot {
         }
     }
 
-    /// Hands a sentence to the map that arrived so long ago. One without `began` counts as said at the newest stamp that had
-    /// arrived then, or `ago_s` before.
+    /// Hands a sentence to the map. One without `began` counts as said at the newest stamp that has arrived, or where the
+    /// robot's clock stood `ago_s` before `now`.
     ///
     /// # Errors
     /// If it can't be told when it was said; if the map can't keep up, or has stopped.
     pub fn push_say(&mut self, now: Duration, mut say: Say) -> Result<(), Problem> {
-        if say.began.is_none() {
-            say.began = Some(self.clock.before(now, say.ago_s.unwrap_or_default())?);
+        match say.began {
+            Some(began) => self.clock.check(began)?,
+            None => say.began = Some(self.clock.before(now, say.ago_s.unwrap_or_default())?),
         }
-        self.clock.check(say.began.unwrap_or_default())?;
         let boot = self.boot.unwrap_or_default();
         let stopped = || Problem::new(ErrorCode::Internal, "the map has stopped: see the server's log");
         let busy = || Problem::new(ErrorCode::Busy, "the map can't keep up: say it again later");

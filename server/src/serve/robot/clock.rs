@@ -69,7 +69,8 @@ impl RobotClock {
         let then_s = now.as_secs_f64() - ago_s;
         let until = self.noted.partition_point(|(at, _)| at.as_secs_f64() <= then_s);
         if let Some((at, stamp)) = until.checked_sub(1).and_then(|k| self.noted.get(k)) {
-            return Ok(later(*stamp, then_s - at.as_secs_f64()).min(newest));
+            // What the robot sent then may still be on its way: no reason to put it where the robot was before.
+            return Ok(later(*stamp, then_s - at.as_secs_f64()).min(later(newest, CLOCK_MAX_S)));
         }
         let not_known =
             || Problem::new(ErrorCode::Busy, "the robot's clock is not known yet: say it again later");
@@ -93,7 +94,7 @@ impl RobotClock {
         Ok(then)
     }
 
-    /// Whether a time can be one of this clock.
+    /// Whether a time that a guide tells can be one of this clock.
     ///
     /// # Errors
     /// If not.
@@ -148,12 +149,20 @@ mod tests {
         hear(&mut clock, 0.0, 10.0, 1.0);
         assert!(off_s(clock.before(s(10.0), 0.0).unwrap(), 1009.9) < 1e-9, "the newest");
         assert!(off_s(clock.before(s(10.0), 4.0).unwrap(), 1006.0) < 0.01);
-        // The robot is cut off for a minute, too, and sends what it kept.
+        // The robot is cut off for a minute, too, and sends what it kept after the guide has spoken.
+        assert!(off_s(clock.before(s(70.0), 39.0).unwrap(), 1031.0) < 0.01);
         for k in 0..600 {
             clock.note(s(70.0 + 0.001 * f64::from(k)), stamp(1010.0 + 0.1 * f64::from(k)));
         }
         assert!(off_s(clock.before(s(71.0), 40.0).unwrap(), 1031.0) < 0.01);
         assert!(off_s(clock.before(s(10.5), 0.4).unwrap(), 1010.1) < 0.01);
+    }
+
+    #[test]
+    fn of_a_robot_that_is_silent_no_time_far_ahead_is_reckoned() {
+        let mut clock = RobotClock::default();
+        hear(&mut clock, 0.0, 10.0, 1.0);
+        assert!(off_s(clock.before(s(5000.0), 1.0).unwrap(), 1009.9 + CLOCK_MAX_S) < 0.01);
     }
 
     #[test]
