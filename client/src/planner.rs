@@ -30,7 +30,15 @@ impl Planner {
     /// Where is what people call so? A bare name ("gym") or a whole question ("where is the
     /// gym"). An unknown name is an answer without candidates, no error.
     pub async fn where_is(&self, name: &str) -> Result<WhereReply, ClientError> {
-        let arguments = selector::encode([("name", name)]);
+        self.where_is_in(name, None).await
+    }
+
+    /// The same in another language, by its tag (BCP 47).
+    ///
+    /// # Errors
+    /// If the server does not know it.
+    pub async fn where_is_in(&self, name: &str, lang: Option<&str>) -> Result<WhereReply, ClientError> {
+        let arguments = selector::encode([("name", name)].into_iter().chain(lang.map(|lang| ("lang", lang))));
         ask(&self.session, &self.keys.ask(&self.map, Ask::Where), &arguments, self.timeout).await
     }
 

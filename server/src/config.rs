@@ -3,6 +3,8 @@
 
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use toponym_core::language::Glossary;
+use toponym_core::language::glossary::GlossaryError;
 use toponym_proto::keys::{DEFAULT_ENDPOINT, DEFAULT_SITE, check_id, check_link};
 use toponym_proto::{Invalid, Limits};
 
@@ -16,6 +18,8 @@ pub struct ServerConfig {
     pub listen: Vec<String>,
     /// Address of `/healthz` and `/metrics` (Prometheus), such as `127.0.0.1:7458`; everybody who reaches it may read them.
     pub http: Option<String>,
+    /// Words and names of the site's own, see `toponym_core::language::glossary`.
+    pub lexicon: Option<PathBuf>,
     /// Folder of the maps: a journal and checkpoints of each.
     pub data: PathBuf,
     /// How long a robot's stream waits for sentences that come over other connections.
@@ -67,6 +71,7 @@ impl Default for ServerConfig {
             site: DEFAULT_SITE.into(),
             listen: vec![DEFAULT_ENDPOINT.into()],
             http: None,
+            lexicon: None,
             data: "./toponym-data".into(),
             hold_back_s: 0.5,
             gap_wait_s: 10.0,
@@ -104,6 +109,25 @@ pub enum ConfigError {
     /// A value out of its range.
     #[error("configuration: {0}")]
     Invalid(#[from] Invalid),
+    /// Words that can't be used.
+    #[error("{}: {source}", path.display())]
+    Lexicon {
+        /// Which file.
+        path: PathBuf,
+        /// What and where.
+        source: GlossaryError,
+    },
+}
+
+/// A site's own words, as a file has them.
+///
+/// # Errors
+/// If it can't be read, or a line of it says nothing.
+pub fn words_of(path: &Path) -> Result<String, ConfigError> {
+    let read = std::fs::read_to_string(path);
+    let lines = read.map_err(|source| ConfigError::Read { path: path.into(), source })?;
+    Glossary::read(&lines).map_err(|source| ConfigError::Lexicon { path: path.into(), source })?;
+    Ok(lines)
 }
 
 impl ServerConfig {
@@ -124,6 +148,14 @@ impl ServerConfig {
             ["127.", "localhost:", "[::1]:"].iter().any(|start| address.starts_with(start))
         };
         self.listen.iter().all(local)
+    }
+
+    /// The site's own words, checked; none without a file.
+    ///
+    /// # Errors
+    /// If the file can't be read, or a line of it says nothing.
+    pub fn words(&self) -> Result<String, ConfigError> {
+        self.lexicon.as_deref().map_or(Ok(String::new()), words_of)
     }
 
     /// Where users and their roles are.

@@ -43,6 +43,7 @@ pub fn event(message: Message) -> Event {
             Event::Utterance(event::Utterance {
                 id: m.id,
                 text: m.text,
+                lang: m.lang,
                 alternatives: m.alternatives.into_iter().map(|h| (h.text, h.p)).collect(),
                 speaker: m.speaker,
                 began_ns: began.ns,

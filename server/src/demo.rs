@@ -183,7 +183,7 @@ async fn picture(planner: &Planner, file: &Path) -> Result<()> {
     let track: Vec<Pose2> = graph.places.iter().map(|p| p.pose).collect();
     let out = File::create(file).with_context(|| format!("--image {}", file.display()))?;
     let mut out = BufWriter::new(out);
-    image::draw(&grid, &graph, &track).write_png(&mut out)?;
+    image::draw(&grid, &graph, &track, &[]).write_png(&mut out)?;
     Ok(out.flush()?)
 }
 

@@ -113,6 +113,7 @@ impl Fold {
             Event::Say { boot, say } => self.hear(boot, say, tell),
             Event::Gap { .. } | Event::Tick => {}
             Event::Hold(ns) => self.hold.set_hold(Duration::from_nanos(ns)),
+            Event::Glossary(lines) => drop(self.mapper.step(toponym_core::Event::Glossary(lines))),
         }
         while let Some(message) = self.hold.pop(self.now) {
             self.step(message, tell);

@@ -150,6 +150,7 @@ fn line(index: u64, entry: &Entry) -> Result<serde_json::Value> {
             serde_json::json!({"index": index, "at_s": at_s, "gap": {"boot": boot, "to": to}})
         }
         Event::Tick => serde_json::json!({"index": index, "at_s": at_s, "tick": true}),
+        Event::Glossary(lines) => serde_json::json!({"index": index, "at_s": at_s, "lexicon": lines}),
         Event::Hold(ns) => serde_json::json!({"index": index, "at_s": at_s, "hold_s": *ns as f64 * 1e-9}),
     })
 }

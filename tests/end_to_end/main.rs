@@ -7,3 +7,4 @@ mod questions;
 mod roles;
 mod site;
 mod streams;
+mod words;

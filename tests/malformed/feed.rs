@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicU32, Ordering};
 use toponym::log::{self, CarmenLog, LogError, Narration, Notes, Options, Records};
-use toponym_core::language;
+use toponym_core::language::Speech;
 use toponym_journal::entry::EntryError;
 use toponym_journal::{Checkpoint, Entry, Journal, JournalError, segment};
 use toponym_proto::keys::check_key;
@@ -181,6 +181,7 @@ fn settings(bytes: &[u8]) -> Result {
         Ok(config) => Ok(format!("{config:?}")),
         Err(e @ ConfigError::Read { .. }) => Err(came(Came::NoFile, e)),
         Err(e @ ConfigError::Parse { .. }) => Err(came(Came::NoToml, e)),
+        Err(e @ ConfigError::Lexicon { .. }) => Err(came(Came::Malformed, e)),
         Err(ConfigError::Invalid(e)) => Err(invalid(e)),
     }
 }
@@ -238,7 +239,7 @@ fn header_stamp() -> toponym_proto::Stamp {
 }
 
 fn sentence(text: &str) -> Result {
-    let parse = language::parse_hearings(text, &[]);
+    let parse = Speech::default().parse_hearings(text, &[]);
     if parse.acts().is_empty() { Err(came(Came::NotUnderstood, "")) } else { Ok(parse.notation().into()) }
 }
 
@@ -246,7 +247,7 @@ fn entry_error(e: EntryError) -> Outcome {
     match e {
         EntryError::Kind(kind) => came(Came::UnknownKind, kind),
         EntryError::Short(bytes) => came(Came::Short, bytes),
-        EntryError::Long(_) => came(Came::Malformed, e),
+        EntryError::Long(_) | EntryError::Text => came(Came::Malformed, e),
         EntryError::Message(e) => refused(e),
     }
 }

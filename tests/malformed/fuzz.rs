@@ -6,7 +6,8 @@ use crate::seeds::{LASER, ROBOT, keys, mends, messages};
 use rand::RngExt as _;
 use rand_chacha::ChaCha8Rng;
 use serde_json::Value;
-use toponym_core::language::{self, Name, Parse};
+use std::sync::Arc;
+use toponym_core::language::{self, Glossary, Name, Parse, Speech};
 use toponym_proto::codec::{ENCODING_BINCODE, ENCODING_JSON, place_of};
 use toponym_proto::keys::Input;
 use toponym_proto::{Limits, Message, selector};
@@ -319,11 +320,14 @@ fn fuzz_sentences() {
 /// All that the server asks of a sentence.
 fn hear(text: &str, said_before: &Parse, random: &mut ChaCha8Rng) -> bool {
     let alternatives = [((*pick(&SAID, random)).to_owned(), 0.25)];
-    let parse = language::parse_hearings(text, &alternatives);
+    let site = Glossary::read("the hall = canteen\nname: Room to Grow; Not Here\n-s = rooms").unwrap();
+    let tag = *pick(&[None, Some("de")], random);
+    let speech = Speech::new(tag, Arc::new(site)).unwrap();
+    let parse = speech.parse_hearings(text, &alternatives);
     parse_is_sound(&parse, 2);
     let names: Vec<Name> = parse.acts().iter().flat_map(|act| language::names_in(&act.content)).collect();
     for name in &names {
-        let _ = language::spelling(text, name);
+        let _ = speech.spelling(text, name);
     }
     if let (Some(best), Some(name)) = (parse.best(), names.first()) {
         language::renamed(best, name, &Name::new("gym").unwrap());
@@ -331,11 +335,11 @@ fn hear(text: &str, said_before: &Parse, random: &mut ChaCha8Rng) -> bool {
     let mut resolved = parse.clone();
     language::resolve_it(&mut resolved, language::topic(said_before));
     parse_is_sound(&resolved, 2);
-    let guess = language::guess(text).map(|guess| Parse { analyses: vec![guess] });
-    let before = language::as_before(text, said_before);
+    let guess = speech.guess(text).map(|guess| Parse { analyses: vec![guess] });
+    let before = speech.as_before(text, said_before);
     for parse in guess.iter().chain(&before) {
         parse_is_sound(parse, 1);
     }
-    let _ = (language::parse_query(text), language::reply(text));
+    let _ = (speech.parse_query(text), speech.reply(text));
     !parse.acts().is_empty()
 }

@@ -76,7 +76,7 @@ fn tail_is_sound(checkpoint: &Checkpoint, tail: &[(u64, Entry)]) {
         match &entry.event {
             Event::Message(message) => is_sound(message, &Limits::NONE),
             Event::Say { say, .. } => is_sound(&Message::Say(say.clone()), &Limits::NONE),
-            Event::Gap { .. } | Event::Tick | Event::Hold(_) => {}
+            Event::Gap { .. } | Event::Tick | Event::Hold(_) | Event::Glossary(_) => {}
         }
     }
 }

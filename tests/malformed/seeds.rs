@@ -177,6 +177,7 @@ pub fn entries() -> Vec<Entry> {
         Event::Gap { boot: 3, to: 12 },
         Event::Tick,
         Event::Hold(500_000_000),
+        Event::Glossary("mensa = canteen\nname: Bertha\n".into()),
         Event::Message(Message::Mend(Mend::Undo { id: None })),
         Event::Message(Message::Odom(odom())),
     ];

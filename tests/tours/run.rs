@@ -125,7 +125,7 @@ impl Run {
     }
 
     fn ask(&self, question: &str) -> Option<Answer> {
-        match self.mapper.answer(&Query::Where { text: question.into() }) {
+        match self.mapper.answer(&Query::Where { text: question.into(), lang: None }) {
             toponym_core::Answer::Where(answer) => Some(Answer::of(&answer)),
             _ => None,
         }

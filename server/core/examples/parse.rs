@@ -1,26 +1,31 @@
 //! Reads sentences from standard input, one a line, and prints what each says, as JSON:
 //! `{"text": "this is the gym", "parse": "label(here,gym)", "words": "I heard: …", "analyses": [[0.9, …]]}`.
 //!
-//! `--score FILE` reads lines `{"level": 1, "text": …, "parse": …}` instead, prints each that is read
+//! `--lang TAG` reads another language, `--lexicon FILE` with a site's own words. `--score FILE` reads lines `{"level": 1, "text": …, "parse": …}` instead, prints each that is read
 //! otherwise, and the share read exactly per level.
 
 use std::collections::BTreeMap;
 use std::io::{self, BufRead, Write};
-use toponym_core::language::{parse, words};
+use std::sync::Arc;
+use toponym_core::language::{Glossary, Speech, parse, words};
 
 fn main() -> io::Result<()> {
-    let mut arguments = std::env::args().skip(1);
-    match (arguments.next().as_deref(), arguments.next()) {
-        (Some("--score"), Some(file)) => score(&std::fs::read_to_string(file)?),
-        _ => read(),
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let of = |name: &str| arguments.iter().position(|a| a == name).and_then(|at| arguments.get(at + 1));
+    if let Some(file) = of("--score") {
+        return score(&std::fs::read_to_string(file)?);
     }
+    let lines = of("--lexicon").map_or(Ok(String::new()), std::fs::read_to_string)?;
+    let site = Glossary::read(&lines).map_err(io::Error::other)?;
+    let speech = Speech::new(of("--lang").map(String::as_str), Arc::new(site));
+    read(&speech.ok_or_else(|| io::Error::other(format!("--lang: give {}", Speech::known())))?)
 }
 
-fn read() -> io::Result<()> {
+fn read(speech: &Speech) -> io::Result<()> {
     let mut out = io::stdout().lock();
     for line in io::stdin().lock().lines() {
         let text = line?;
-        let parse = parse(&text);
+        let parse = speech.parse(&text);
         let others: Vec<(f64, &str)> =
             parse.analyses.iter().map(|a| (a.weight, a.notation.as_str())).collect();
         writeln!(

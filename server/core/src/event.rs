@@ -20,6 +20,8 @@ pub enum Event {
     Utterance(Utterance),
     /// What an operator mends.
     Command(Command),
+    /// Words of the site's own, from now on: lines of a [`crate::language::Glossary`]. Others are ignored.
+    Glossary(String),
     /// The stream ended: nothing is waited for any more, all places freeze.
     Flush,
 }
@@ -97,6 +99,8 @@ pub struct Utterance {
     pub id: String,
     /// What was said.
     pub text: String,
+    /// Its language (BCP 47); none is English.
+    pub lang: Option<String>,
     /// Other hearings of the speech recogniser, each with its probability.
     pub alternatives: Vec<(String, f64)>,
     /// Who said it.

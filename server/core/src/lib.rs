@@ -23,6 +23,7 @@ pub mod graph;
 pub mod language;
 pub mod mapper;
 pub mod random;
+pub mod regions;
 pub mod scan;
 pub mod smoothing;
 pub mod talk;

@@ -70,7 +70,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 13 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 14 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -109,6 +109,10 @@ impl Mapper {
             Event::Command(command) => {
                 self.change(&mut effects, |filter, talk| vec![Effect::Mended(talk.mend(filter, &command))]);
                 self.stand(&mut effects);
+            }
+            Event::Glossary(lines) => {
+                self.talk.learn(&lines);
+                self.rev += 1;
             }
             Event::Flush => self.flush(&mut effects),
         }
@@ -173,6 +177,11 @@ impl Mapper {
     /// What all particles share.
     pub fn graph(&self) -> &Graph {
         &self.filter.graph
+    }
+
+    /// Words of the site's own that it has learnt, as lines of a [`crate::language::Glossary`].
+    pub fn words(&self) -> &str {
+        self.talk.ledger.glossary.text()
     }
 
     /// Its settings.

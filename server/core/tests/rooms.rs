@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// Rooms from the ground up: each may name those before it, and itself.
-const ROOMS: [&str; 17] = [
+const ROOMS: [&str; 18] = [
     "wide",
     "geometry",
     "random",
@@ -17,6 +17,7 @@ const ROOMS: [&str; 17] = [
     "smoothing",
     "track",
     "graph",
+    "regions",
     "language",
     "filter",
     "talk",
@@ -25,7 +26,7 @@ const ROOMS: [&str; 17] = [
     "mapper",
 ];
 /// The same within `language`.
-const LANGUAGE: [&str; 18] = [
+const LANGUAGE: [&str; 20] = [
     "measure",
     "relation",
     "lexicon",
@@ -42,6 +43,8 @@ const LANGUAGE: [&str; 18] = [
     "understand",
     "phrases",
     "ellipsis",
+    "glossary",
+    "speech",
     "grounding",
     "clauses",
 ];

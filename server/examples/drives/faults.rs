@@ -100,7 +100,7 @@ pub fn report(plans: Option<&Path>, seeds: std::ops::Range<u64>, only: Option<&s
 }
 
 /// Floor plans below a folder, in the order of their names.
-fn buildings(folder: &Path) -> Vec<PathBuf> {
+pub fn buildings(folder: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
     let mut folders = vec![folder.to_owned()];
     while let Some(folder) = folders.pop() {
@@ -210,14 +210,24 @@ fn played(recording: &Recording, each: bool) -> Outcome {
 }
 
 /// A scan's pose as it was mapped and in truth, and whether the robot was doubtful or lost then.
-struct Row {
-    made: Pose2,
-    truth: Pose2,
-    told: bool,
+pub struct Row {
+    pub made: Pose2,
+    pub truth: Pose2,
+    pub told: bool,
 }
 
-/// How far each is from its truth after the best rigid alignment (Horn 1987, in the plane).
+/// How far each is from its truth after the best rigid alignment.
 fn errors_m(rows: &[Row]) -> Vec<f64> {
+    let to_truth = alignment(rows);
+    let off = |r: &Row| {
+        let (x_m, y_m) = to_truth(r.made.x_m, r.made.y_m);
+        (x_m - r.truth.x_m).hypot(y_m - r.truth.y_m)
+    };
+    rows.iter().map(off).collect()
+}
+
+/// Takes points as they were mapped to where they are, by the best rigid alignment (Horn 1987, in the plane).
+pub fn alignment(rows: &[Row]) -> impl Fn(f64, f64) -> (f64, f64) + use<> {
     let n = rows.len().max(1) as f64;
     let at = |p: &Pose2| Vector2::new(p.x_m, p.y_m);
     let made = rows.iter().map(|r| at(&r.made)).sum::<Vector2<f64>>() / n;
@@ -226,5 +236,8 @@ fn errors_m(rows: &[Row]) -> Vec<f64> {
         rows.iter().map(|r| (at(&r.made) - made) * (at(&r.truth) - truth).transpose()).sum();
     let (s, c) = (h[(0, 1)] - h[(1, 0)]).atan2(h[(0, 0)] + h[(1, 1)]).sin_cos();
     let turn = Matrix2::new(c, -s, s, c);
-    rows.iter().map(|r| (turn * (at(&r.made) - made) + truth - at(&r.truth)).norm()).collect()
+    move |x_m, y_m| {
+        let to = turn * (Vector2::new(x_m, y_m) - made) + truth;
+        (to.x, to.y)
+    }
 }

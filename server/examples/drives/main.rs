@@ -7,6 +7,7 @@
 //! cargo run --release -p toponym-server --example drives -- dark --seeds 20
 //! cargo run --release -p toponym-server --example drives -- absence --seeds 20
 //! cargo run --release -p toponym-server --example drives -- faults --seeds 200 --plans PLANS
+//! cargo run --release -p toponym-server --example drives -- rooms --seeds 20 --plans PLANS
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
 //! shows on buildings not learned from how often fits are true that are called so with some probability.
@@ -25,6 +26,7 @@ mod dark;
 mod drive;
 mod faults;
 mod logistic;
+mod rooms;
 
 use clap::{Parser, Subcommand};
 use drive::Drive;
@@ -77,6 +79,18 @@ enum What {
         #[arg(long)]
         clean: bool,
     },
+    /// How regions of maps lie over rooms.
+    Rooms {
+        /// Folder with floor plans (XML of the KTH campus data set); none: random offices.
+        #[arg(long)]
+        plans: Option<PathBuf>,
+        /// The first seed.
+        #[arg(long, default_value_t = 1)]
+        from: u64,
+        /// How many.
+        #[arg(long, default_value_t = 20)]
+        seeds: u64,
+    },
     /// Errors of the chain over dark stretches, and what it claims.
     Dark {
         /// Kinds of tours, or how they begin; none: all of them.
@@ -100,6 +114,7 @@ fn main() {
         What::Faults { plans, from, seeds, only, clean } => {
             faults::report(plans.as_deref(), from..from + seeds, only.as_deref(), clean);
         }
+        What::Rooms { plans, from, seeds } => rooms::report(plans.as_deref(), from..from + seeds),
         What::Absence { seeds } => absence::report(1001..1001 + seeds),
         What::Dark { kinds, seeds, each } => dark::report(&kinds, 1..seeds + 1, each),
     }

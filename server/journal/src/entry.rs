@@ -36,6 +36,8 @@ pub enum Event {
     Tick,
     /// From now on the stream waits so long for sentences, ns.
     Hold(u64),
+    /// From now on the site's own words are these lines.
+    Glossary(String),
 }
 
 /// These bytes are no entry.
@@ -50,6 +52,9 @@ pub enum EntryError {
     /// Too long.
     #[error("{0} bytes too many")]
     Long(usize),
+    /// Words that are no UTF-8.
+    #[error("words that are no UTF-8")]
+    Text,
     /// The message in it can't be read.
     #[error(transparent)]
     Message(#[from] Refused),
@@ -61,12 +66,12 @@ impl Entry {
         match &self.event {
             Event::Message(message) => message.header().map(|h| (h.boot, h.seq)),
             Event::Gap { boot, to } => to.checked_sub(1).map(|seq| (*boot, seq)),
-            Event::Say { .. } | Event::Tick | Event::Hold(_) => None,
+            Event::Say { .. } | Event::Tick | Event::Hold(_) | Event::Glossary(_) => None,
         }
     }
 
     /// `at u64 │ kind u8 │ …`: 1 message (bincode form), 2 sentence (`boot u64`, bincode form), 3 gap
-    /// (`boot u64`, `to u64`), 4 tick, 5 hold (`ns u64`).
+    /// (`boot u64`, `to u64`), 4 tick, 5 hold (`ns u64`), 6 glossary (`length u32`, UTF-8).
     /// Little-endian.
     pub fn to_bytes(&self) -> Result<Vec<u8>, Refused> {
         let mut bytes = self.at_ns.to_le_bytes().to_vec();
@@ -90,6 +95,11 @@ impl Entry {
                 bytes.push(5);
                 bytes.extend(ns.to_le_bytes());
             }
+            Event::Glossary(lines) => {
+                bytes.push(6);
+                bytes.extend((lines.len() as u32).to_le_bytes());
+                bytes.extend(lines.as_bytes());
+            }
         }
         Ok(bytes)
     }
@@ -111,6 +121,12 @@ impl Entry {
             3 => ends(25).and(Ok(Event::Gap { boot: u64_at(9)?, to: u64_at(17)? }))?,
             4 => ends(9).and(Ok(Event::Tick))?,
             5 => ends(17).and(Ok(Event::Hold(u64_at(9)?)))?,
+            6 => {
+                let length = toponym_proto::frame::u32_at(bytes, 9).ok_or_else(short)? as usize;
+                let lines = bytes.get(13..13 + length).ok_or_else(short)?;
+                ends(13 + length)?;
+                Event::Glossary(String::from_utf8(lines.to_vec()).map_err(|_| EntryError::Text)?)
+            }
             kind => return Err(EntryError::Kind(*kind)),
         };
         Ok(Self { at_ns: u64_at(0)?, event })
@@ -133,6 +149,7 @@ mod tests {
             Event::Gap { boot: 3, to: 12 },
             Event::Tick,
             Event::Hold(500),
+            Event::Glossary("mensa = canteen\n".into()),
         ];
         for (at_ns, event) in (5..).zip(events) {
             let entry = Entry { at_ns, event };

@@ -31,6 +31,9 @@ pub struct MapArgs {
     /// Sentences: one {"t": seconds, "text": "this is the gym"} a line
     #[arg(long, value_name = "FILE.jsonl")]
     pub narration: Option<PathBuf>,
+    /// Words and names of the site, as `serve --lexicon` takes them
+    #[arg(long, value_name = "FILE")]
+    pub lexicon: Option<PathBuf>,
     /// Particles
     #[arg(long, value_name = "N", conflicts_with = "start_map", value_parser = clap::value_parser!(u32).range(1..=10_000))]
     pub particles: Option<u32>,
@@ -80,6 +83,9 @@ pub struct MapArgs {
     /// Go on from a saved map; its settings come with it
     #[arg(long, value_name = "FILE")]
     pub start_map: Option<PathBuf>,
+    /// Write rooms: outlines, doorways, names
+    #[arg(long, value_name = "FILE.json")]
+    pub regions: Option<PathBuf>,
     /// Draw grid, trajectory, edges and names
     #[arg(long, value_name = "FILE.png")]
     pub image: Option<PathBuf>,
@@ -87,12 +93,13 @@ pub struct MapArgs {
 
 impl MapArgs {
     /// The files to write, by option.
-    pub fn outputs(&self) -> [(&'static str, Option<&PathBuf>); 5] {
+    pub fn outputs(&self) -> [(&'static str, Option<&PathBuf>); 6] {
         [
             ("--trajectory", self.trajectory.as_ref()),
             ("--history", self.history.as_ref()),
             ("--report", self.report.as_ref()),
             ("--save-map", self.save_map.as_ref()),
+            ("--regions", self.regions.as_ref()),
             ("--image", self.image.as_ref()),
         ]
     }

@@ -1,6 +1,7 @@
 //! A picture of the map: grid, trajectory, places, edges by kind, names.
 
 use super::canvas::{Canvas, LETTER};
+use super::shades::shades;
 use embedded_graphics::pixelcolor::Rgb888;
 use embedded_graphics::prelude::*;
 use embedded_graphics::primitives::Rectangle;
@@ -8,6 +9,7 @@ use std::collections::BTreeMap;
 use toponym_core::Pose2;
 use toponym_core::answers::query::{EdgeView, GraphAnswer, Grid, PlaceView};
 use toponym_core::edge::{EdgeKind, PlaceId};
+use toponym_core::regions::Region;
 
 /// Longest side of the map's part of the picture, pixels.
 const SIDE_MAX: usize = 1800;
@@ -48,12 +50,12 @@ pub fn resolution_m(extent_m: f64) -> f64 {
     (extent_m / SIDE_MAX as f64).max(0.05)
 }
 
-/// Draws a map. `trajectory` in order of time, map frame.
-pub fn draw(grid: &Grid, graph: &GraphAnswer, trajectory: &[Pose2]) -> Canvas {
+/// Draws a map. `trajectory` in order of time, map frame; `regions` as far as they are known.
+pub fn draw(grid: &Grid, graph: &GraphAnswer, trajectory: &[Pose2], regions: &[Region]) -> Canvas {
     let view = View::of(grid, graph, trajectory);
     let (full_width, height) = view.size();
     let mut canvas = Canvas::new(Size::new(full_width as u32, (height + LEGEND) as u32), Rgb888::WHITE);
-    view.draw_grid(grid, &mut canvas, height);
+    view.draw_grid(grid, &shades(grid, regions), &mut canvas, height);
     for pair in trajectory.windows(2) {
         canvas.line(view.pixel(&pair[0]), view.pixel(&pair[1]), TRAJECTORY, 1);
     }
@@ -130,7 +132,7 @@ impl View {
         Point::new(x, y)
     }
 
-    fn draw_grid(&self, grid: &Grid, canvas: &mut Canvas, height: i32) {
+    fn draw_grid(&self, grid: &Grid, shades: &[Option<Rgb888>], canvas: &mut Canvas, height: i32) {
         let all = Size::new(canvas.size().width, height as u32);
         canvas.fill(Rectangle::new(Point::zero(), all), UNKNOWN);
         // Occupied cells last: where several share a pixel, a wall must not get lost.
@@ -146,8 +148,11 @@ impl View {
                 (below_right.x - top_left.x).max(1) as u32,
                 (below_right.y - top_left.y).max(1) as u32,
             );
-            let light = 255 - i32::from(grid.cells[k].min(100)) * 235 / 100;
-            canvas.fill(Rectangle::new(top_left, size), Rgb888::new(light as u8, light as u8, light as u8));
+            let paper = shades[k].unwrap_or(Rgb888::WHITE);
+            let light = 255 - u32::from(grid.cells[k].clamp(0, 100) as u8) * 235 / 100;
+            let inked = |paper: u8| (u32::from(paper) * light / 255) as u8;
+            let colour = Rgb888::new(inked(paper.r()), inked(paper.g()), inked(paper.b()));
+            canvas.fill(Rectangle::new(top_left, size), colour);
         }
     }
 }
@@ -289,7 +294,7 @@ mod tests {
     #[test]
     fn things_are_where_they_belong() {
         let trajectory = [Pose2::new(1.0, 2.0, 0.0), Pose2::new(8.0, 2.0, 0.0)];
-        let canvas = draw(&grid(), &graph(), &trajectory);
+        let canvas = draw(&grid(), &graph(), &trajectory, &[]);
         let at = |x_m: f64, y_m: f64| {
             let (x, y) = ((x_m + 1.0) * 60.0, (4.0 - (y_m + 1.0)) * 60.0);
             canvas.pixel(Point::new(x as i32 + MARGIN, y as i32 + MARGIN)).unwrap()
@@ -312,16 +317,16 @@ mod tests {
         cells[20 * 400 + 399] = 100;
         let stray = Grid { width: 400, cells, ..grid() };
         assert_eq!(grid_bounds(&stray), [[0.0, 0.0], [10.0, 4.0]]);
-        assert_eq!(draw(&stray, &graph(), &[]).size(), draw(&grid(), &graph(), &[]).size());
+        assert_eq!(draw(&stray, &graph(), &[], &[]).size(), draw(&grid(), &graph(), &[], &[]).size());
     }
 
     #[test]
     fn an_empty_map_and_a_huge_one_fit_too() {
         let none = GraphAnswer { places: vec![], particles: vec![], ..graph() };
         let empty = Grid { width: 0, height: 0, cells: vec![], ..grid() };
-        assert!(draw(&empty, &none, &[]).size().width >= WIDTH_MIN as u32);
+        assert!(draw(&empty, &none, &[], &[]).size().width >= WIDTH_MIN as u32);
         let far = [Pose2::default(), Pose2::new(900.0, 100.0, 0.0)];
-        let size = draw(&grid(), &graph(), &far).size();
+        let size = draw(&grid(), &graph(), &far, &[]).size();
         assert!(size.width <= 2000 && size.height <= 2000, "{size:?}");
     }
 

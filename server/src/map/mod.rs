@@ -6,7 +6,9 @@ mod history;
 pub mod image;
 mod play;
 mod progress;
+mod regions;
 mod report;
+mod shades;
 mod summary;
 mod timing;
 mod trajectory;
@@ -15,6 +17,7 @@ pub use args::{MapArgs, Preset};
 pub use canvas::Canvas;
 pub use report::build;
 
+use crate::config::words_of;
 use crate::fold::saved_map;
 use anyhow::{Context, Result, anyhow, bail};
 use history::History;
@@ -27,7 +30,7 @@ use std::time::Instant;
 use timing::{Stage, Timing};
 use toponym::log::{self, Narration, Notes, Records};
 use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
-use toponym_core::{Answer, Mapper, Pose2, Query};
+use toponym_core::{Answer, Event, Mapper, Pose2, Query};
 use toponym_journal::Checkpoint;
 
 /// Runs `map`.
@@ -38,10 +41,13 @@ pub fn run(args: &MapArgs) -> Result<()> {
         Some(file) => log::merged(log, &Narration::read(file)?),
         None => log,
     };
-    let mapper = match &args.start_map {
+    let mut mapper = match &args.start_map {
         Some(file) => load(file)?,
         None => Mapper::on_trial(args.config(), args.trial()),
     };
+    if let Some(file) = &args.lexicon {
+        mapper.step(Event::Glossary(words_of(file)?));
+    }
     let pool = rayon::ThreadPoolBuilder::new()
         .num_threads(args.threads.unwrap_or(0).into())
         .build()
@@ -122,7 +128,7 @@ fn play(mut log: Box<dyn Records>, mapper: Mapper, args: &MapArgs) -> Result<Fin
 
 fn ask(played: &mut Played, text: &str) -> Option<WhereAnswer> {
     let began = Instant::now();
-    let answer = played.mapper.answer(&Query::Where { text: text.into() });
+    let answer = played.mapper.answer(&Query::Where { text: text.into(), lang: None });
     played.stopwatch.add(Stage::Answer, began.elapsed());
     match answer {
         Answer::Where(answer) => Some(answer),
@@ -138,6 +144,10 @@ impl Finished {
         }
         if let (Some(file), Some(bytes)) = (&args.save_map, &self.saved) {
             std::fs::write(file, bytes).with_context(|| format!("--save-map {}", file.display()))?;
+        }
+        if let Some(file) = &args.regions {
+            let regions = regions::entries(&self.played.mapper.snapshot());
+            write_json(&regions, file).with_context(|| format!("--regions {}", file.display()))?;
         }
         if let Some(file) = &args.image {
             draw(&self.played.mapper, &self.trajectory, file)
@@ -159,9 +169,9 @@ fn said(written: std::io::Result<()>) -> Result<()> {
     }
 }
 
-fn write_json(report: &report::Report, file: &Path) -> Result<()> {
+fn write_json<T: serde::Serialize>(value: &T, file: &Path) -> Result<()> {
     let mut out = BufWriter::new(File::create(file)?);
-    serde_json::to_writer_pretty(&mut out, report)?;
+    serde_json::to_writer_pretty(&mut out, value)?;
     out.write_all(b"\n")?;
     Ok(out.flush()?)
 }
@@ -180,7 +190,7 @@ fn draw(mapper: &Mapper, trajectory: &[Pose2], file: &Path) -> Result<()> {
     let query = Query::Grid { resolution_m: image::resolution_m(extent_m) };
     let Answer::Grid(grid) = snapshot.answer(&query) else { bail!("the map has no grid to draw") };
     let mut out = BufWriter::new(File::create(file)?);
-    image::draw(&grid, &graph, trajectory).write_png(&mut out)?;
+    image::draw(&grid, &graph, trajectory, &snapshot.regions()).write_png(&mut out)?;
     Ok(out.flush()?)
 }
 

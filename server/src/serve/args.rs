@@ -35,6 +35,9 @@ pub struct ServeArgs {
     /// Tell how the server does at this address: /healthz, and /metrics for Prometheus
     #[arg(long, value_name = "ADDRESS")]
     pub http: Option<String>,
+    /// Words and names of your site, one to a line: "refectory = canteen", "name: Room to Grow"
+    #[arg(long, value_name = "FILE")]
+    pub lexicon: Option<PathBuf>,
     /// Log what people say, too
     #[arg(long)]
     pub log_speech: bool,
@@ -54,6 +57,7 @@ impl ServeArgs {
             config.data.clone_from(data);
         }
         config.http = self.http.clone().or(config.http);
+        config.lexicon = self.lexicon.clone().or(config.lexicon);
         config.log_speech |= self.log_speech;
         config.check()?;
         Ok(config)
@@ -66,6 +70,7 @@ pub async fn run(args: ServeArgs) -> anyhow::Result<()> {
     if args.check_config {
         network::check_tls(&config)?;
         Policy::read(&config.policy_path())?;
+        config.words()?;
         print!("{}", toml::to_string(&config)?);
         return Ok(());
     }
@@ -73,7 +78,7 @@ pub async fn run(args: ServeArgs) -> anyhow::Result<()> {
     loop {
         let policy = Policy::read(&config.policy_path())?;
         let server = Server::start(config.clone(), args.record.clone()).await?;
-        let saving = save_on_hangup(server.board())?;
+        let saving = renew_on_hangup(server.board(), config.clone())?;
         let changed = tokio::select! {
             () = &mut shutdown => false,
             () = changed(&config, &policy) => true,
@@ -110,13 +115,17 @@ async fn changed(config: &ServerConfig, policy: &Policy) {
     }
 }
 
-/// Saves all maps each time the process is told to (SIGHUP).
+/// Saves all maps and reads the site's words anew each time the process is told to (SIGHUP).
 #[cfg(unix)]
-fn save_on_hangup(board: Arc<Board>) -> std::io::Result<tokio::task::JoinHandle<()>> {
+fn renew_on_hangup(board: Arc<Board>, config: ServerConfig) -> std::io::Result<tokio::task::JoinHandle<()>> {
     use tokio::signal::unix::{SignalKind, signal};
     let mut hangup = signal(SignalKind::hangup())?;
     Ok(tokio::spawn(async move {
         while hangup.recv().await.is_some() {
+            match config.words() {
+                Ok(words) => board.learn(words),
+                Err(e) => error!("words stay as they are: {e}"),
+            }
             let board = board.clone();
             let saved = tokio::task::spawn_blocking(move || save_all(&board)).await;
             match saved {
@@ -130,7 +139,7 @@ fn save_on_hangup(board: Arc<Board>) -> std::io::Result<tokio::task::JoinHandle<
 
 /// Saves all maps each time the process is told to.
 #[cfg(not(unix))]
-fn save_on_hangup(_: Arc<Board>) -> std::io::Result<tokio::task::JoinHandle<()>> {
+fn renew_on_hangup(_: Arc<Board>, _: ServerConfig) -> std::io::Result<tokio::task::JoinHandle<()>> {
     Ok(tokio::spawn(std::future::pending()))
 }
 

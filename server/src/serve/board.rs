@@ -9,6 +9,7 @@ use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
 use toponym_core::Snapshot;
+use toponym_journal::Event;
 use toponym_proto::answer::{MapIdentity, Problem, RobotState};
 use toponym_proto::{Keys, Stamp};
 
@@ -128,6 +129,8 @@ pub struct Board {
     pub keys: Keys,
     /// Site id.
     pub site: String,
+    /// Words of the site's own, see [`toponym_core::language::Glossary`].
+    pub words: ArcSwap<String>,
     /// The maps.
     pub maps: ArcSwap<BTreeMap<String, Arc<MapView>>>,
     /// Maps that could not be loaded, or made room for others, and why.
@@ -154,10 +157,11 @@ pub struct Board {
 
 impl Board {
     /// An empty one.
-    pub fn new(keys: Keys, site: &str, data: &Path) -> Self {
+    pub fn new(keys: Keys, site: &str, data: &Path, words: String) -> Self {
         Self {
             keys,
             site: site.into(),
+            words: ArcSwap::from_pointee(words),
             maps: ArcSwap::default(),
             broken: Mutex::default(),
             robots: Mutex::default(),
@@ -175,6 +179,18 @@ impl Board {
     /// Counts that a limit was reached.
     pub fn reach(&self, limit: &'static str) {
         *lock(&self.reached).entry(limit).or_default() += 1;
+    }
+
+    /// From now on the site's own words are these; every map takes them in as something that it hears.
+    pub fn learn(&self, words: String) {
+        if **self.words.load() == words {
+            return;
+        }
+        for map in self.maps.load().values() {
+            // One whose journal has ended learns them at its next start.
+            let _ = map.work.send(Work::Take(Event::Glossary(words.clone())));
+        }
+        self.words.store(Arc::new(words));
     }
 
     /// Shows a map no more.

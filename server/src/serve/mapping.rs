@@ -315,7 +315,11 @@ pub fn suspicions(fold: &Fold) -> Vec<String> {
 pub fn bytes_of(event: &Event) -> usize {
     match event {
         // An operator's comes another way; the others are small, or the journal's own.
-        Event::Message(Message::Mend(_)) | Event::Gap { .. } | Event::Tick | Event::Hold(_) => 0,
+        Event::Message(Message::Mend(_))
+        | Event::Gap { .. }
+        | Event::Tick
+        | Event::Hold(_)
+        | Event::Glossary(_) => 0,
         Event::Message(message) => message.weight_bytes(),
         Event::Say { say, .. } => say.weight_bytes(),
     }

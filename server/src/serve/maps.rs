@@ -252,6 +252,14 @@ impl Maps {
         if held_ns.map_or(fold.hold(), Duration::from_nanos) != self.hold() {
             let _ = view.work.try_send(Work::Take(Event::Hold(self.hold().as_nanos() as u64)));
         }
+        let learnt = tail.iter().rev().find_map(|(_, entry)| match &entry.event {
+            Event::Glossary(words) => Some(words.as_str()),
+            _ => None,
+        });
+        let words = self.board.words.load_full();
+        if learnt.unwrap_or_else(|| fold.mapper.words()) != *words {
+            let _ = view.work.try_send(Work::Take(Event::Glossary(words.to_string())));
+        }
         let saved = journal.durable() - tail.len() as u64;
         let mapping = Mapping {
             view: view.clone(),

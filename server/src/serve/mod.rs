@@ -130,7 +130,7 @@ impl Server {
         try_rules(&config, &policy).await?;
         let session = network::open(&config, &policy).await?;
         let endpoints = session.info().locators().await.iter().map(ToString::to_string).collect();
-        let board = Arc::new(Board::new(keys.clone(), &config.site, &config.data));
+        let board = Arc::new(Board::new(keys.clone(), &config.site, &config.data, config.words()?));
         let records = record.map(Recordings::new).transpose()?;
         let mut watchers = Vec::new();
         if let Some(address) = &config.http {

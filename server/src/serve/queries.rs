@@ -6,8 +6,8 @@ use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use toponym_core::answers::snapshot::asks_of_robot;
 use toponym_core::effects::TrackState;
+use toponym_core::language::Speech;
 use toponym_core::{Answer, Query, Snapshot};
 use toponym_proto::answer::{ANSWER_VERSION, Clocks, Done, ErrorCode, Mended, Problem, RobotState};
 use toponym_proto::keys::Ask;
@@ -145,9 +145,9 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
     let snapshot = map.snapshot.load_full();
     let query = match ask {
         Ask::Where => {
-            let [name, text, robot] = take(arguments, ["name", "text", "robot"])?;
+            let [name, text, lang, robot] = take(arguments, ["name", "text", "lang", "robot"])?;
             check_robot(map, robot.as_deref())?;
-            let query = where_query(name, text)?;
+            let query = where_query(name, text, lang)?;
             check_localised(&snapshot, &query, robot.is_some())?;
             query
         }
@@ -175,7 +175,7 @@ pub fn graph(map: &MapView) -> Result<Vec<u8>, Problem> {
     answer_about(map, Ask::Graph, Arguments::new())
 }
 
-fn where_query(name: Option<String>, text: Option<String>) -> Result<Query, Problem> {
+fn where_query(name: Option<String>, text: Option<String>, lang: Option<String>) -> Result<Query, Problem> {
     let ((Some(text), None) | (None, Some(text))) = (name, text) else {
         return Err(Problem::new(ErrorCode::BadArgument, "give either name or text")
             .field("name")
@@ -184,7 +184,14 @@ fn where_query(name: Option<String>, text: Option<String>) -> Result<Query, Prob
     if text.trim().is_empty() {
         return Err(Problem::new(ErrorCode::BadArgument, "name is empty").field("name"));
     }
-    Ok(Query::Where { text })
+    if !Speech::knows(lang.as_deref()) {
+        let message =
+            format!("lang is {:?}; this server reads {}", lang.unwrap_or_default(), Speech::known());
+        return Err(Problem::new(ErrorCode::BadArgument, message)
+            .field("lang")
+            .hint("?name=K%C3%BCche;lang=de"));
+    }
+    Ok(Query::Where { text, lang })
 }
 
 fn check_robot(map: &MapView, robot: Option<&str>) -> Result<(), Problem> {
@@ -204,7 +211,7 @@ fn check_localised(snapshot: &Snapshot, query: &Query, of_robot: bool) -> Result
     if snapshot.state() != TrackState::Lost {
         return Ok(());
     }
-    if of_robot || matches!(query, Query::Where { text } if asks_of_robot(text)) {
+    if of_robot || snapshot.is_of_robot(query) {
         let message = "the robot doesn't know where it is";
         let hint = "ask without robot= for where things are in the map";
         return Err(Problem::new(ErrorCode::NotLocalised, message).field("robot").hint(hint));

@@ -210,7 +210,7 @@ mod tests {
 
     #[test]
     fn numbers_are_told_as_prometheus_reads_them() {
-        let board = Board::new(Keys::new("lab").unwrap(), "lab", Path::new("."));
+        let board = Board::new(Keys::new("lab").unwrap(), "lab", Path::new("."), String::new());
         let counts = Counts { taken: 7, ..Counts::default() };
         let state = RobotState { robot: "r07".into(), counts, ..RobotState::default() };
         lock(&board.robots).insert("r07".into(), state);
@@ -222,7 +222,7 @@ mod tests {
 
     #[test]
     fn a_map_that_is_not_served_is_no_health() {
-        let board = Board::new(Keys::new("lab").unwrap(), "lab", Path::new("."));
+        let board = Board::new(Keys::new("lab").unwrap(), "lab", Path::new("."), String::new());
         assert_eq!(health(&board), Ok(()));
         lock(&board.broken)
             .insert("attic".into(), Problem::new(ErrorCode::Internal, "attic: damaged at byte 7"));

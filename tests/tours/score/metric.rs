@@ -4,7 +4,7 @@ use super::checkpoint::Share;
 use crate::graph::{Answer, Graphs};
 use crate::truth::{Named, Outline, Path, Question, Truth};
 use toponym_core::Pose2;
-use toponym_core::language::parse_query;
+use toponym_core::language::Speech;
 use toponym_sim::geom::{Area, Point};
 
 /// An answer this near to a right room is right.
@@ -69,7 +69,7 @@ pub fn labels(graphs: &Graphs, truth: &Truth) -> Share {
 
 /// A name as the map spells it: "Lecture Hall 123" and "lecture hall one twenty three" are one.
 fn spelled(name: &str) -> String {
-    parse_query(name).map_or_else(|| name.to_lowercase(), |n| n.as_str().to_owned())
+    Speech::default().parse_query(name).map_or_else(|| name.to_lowercase(), |n| n.as_str().to_owned())
 }
 
 /// Questions answered rightly: in a right room, or by not knowing what was never said. A question that

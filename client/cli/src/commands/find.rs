@@ -16,12 +16,16 @@ const SHOWN_MIN: f64 = 0.005;
 Examples:
   toponym where gym
   toponym where 'elevator lobby' --json
+  toponym where Küche --lang de
   toponym where 'where is the kitchen?' --map floor2 --timeout 1
 
 Bearings are from the robot's nose, left is positive. Exit code 1 if the name is not known.")]
 pub struct WhereArgs {
     /// A name, or a whole question.
     name: String,
+    /// In which language (en, de).
+    #[arg(long, value_name = "TAG")]
+    lang: Option<String>,
     #[command(flatten)]
     asked: AskedArgs,
 }
@@ -53,7 +57,7 @@ pub struct LabelsArgs {
 pub async fn find(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
     let session = to.open().await?;
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
-    let reply = planner.where_is(&args.name).await?;
+    let reply = planner.where_is_in(&args.name, args.lang.as_deref()).await?;
     print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
     Ok(if reply.candidates.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }

@@ -19,6 +19,7 @@ Examples:
   toponym say 'the lab is past the stairs' --explain
   toponym say 'where is the gym?'
   toponym say 'scratch that'
+  toponym say 'das ist die Küche' --lang de
   toponym say 'this is the gym' --spool ~/said     nothing is lost if the server is away
 
 It speaks of the place where the robot is now. Exit code 1 if it was not understood, or if the robot asks something
@@ -32,6 +33,9 @@ pub struct SayArgs {
     /// Who says it.
     #[arg(long)]
     speaker: Option<String>,
+    /// In which language (en, de).
+    #[arg(long, value_name = "TAG")]
+    lang: Option<String>,
     /// Id of the sentence that the robot asked something of: this is the answer.
     #[arg(long, value_name = "ID")]
     answers: Option<String>,
@@ -53,6 +57,7 @@ pub async fn say(to: &Connection, site: &str, args: &SayArgs) -> Result<u8, Fail
     let say = Say {
         robot: args.robot.clone(),
         speaker: args.speaker.clone(),
+        lang: args.lang.clone(),
         answers: args.answers.clone(),
         ..sentence(&args.text)
     };
@@ -141,6 +146,7 @@ mod tests {
     async fn a_sentence_that_nobody_hears_is_kept() {
         let folder = std::env::temp_dir().join(format!("toponym-kept-{}", std::process::id()));
         let args = SayArgs {
+            lang: None,
             text: "this is the gym".into(),
             robot: None,
             speaker: None,

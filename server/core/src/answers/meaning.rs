@@ -24,14 +24,19 @@ pub(crate) struct Meaning {
     pub suggestions: Vec<LabelId>,
 }
 
-/// What a name means among those that something speaks for.
-pub(crate) fn meaning(name: &Name, ledger: &Ledger, known: &[LabelId]) -> Meaning {
+/// What a name means among those that something speaks for: whether one is, and all of them, which takes longer.
+pub(crate) fn meaning(
+    name: &Name,
+    ledger: &Ledger,
+    is_known: &dyn Fn(LabelId) -> bool,
+    known: &dyn Fn() -> Vec<LabelId>,
+) -> Meaning {
     let of = |via, p, labels| Meaning { via, p, labels, suggestions: Vec::new() };
-    let exact = ledger.label(name.as_str());
-    if let Some(label) = exact.filter(|label| known.contains(label)) {
+    let exact = ledger.label(name.as_str()).or_else(|| ledger.spelled_so(name.as_str()));
+    if let Some(label) = exact.filter(|&label| is_known(label)) {
         return of("exact", 1.0, vec![label]);
     }
-    let asked = name.as_str();
+    let (asked, known) = (name.as_str(), known());
     let kinds: Vec<LabelId> =
         known.iter().copied().filter(|&id| is_of_kind(ledger.name(id), asked)).collect();
     if !kinds.is_empty() {
@@ -48,7 +53,7 @@ pub(crate) fn meaning(name: &Name, ledger: &Ledger, known: &[LabelId]) -> Meanin
         return of("sound", p, vec![id]);
     }
     let via = if exact.is_some() { "exact" } else { "unknown" };
-    Meaning { suggestions: like(asked, ledger, known), ..of(via, 0.0, Vec::new()) }
+    Meaning { suggestions: like(asked, ledger, &known), ..of(via, 0.0, Vec::new()) }
 }
 
 /// Names that look like one: by letters, or of the same kind.
@@ -79,7 +84,9 @@ mod tests {
             ledger.enter_name(&Name::new(name).unwrap());
         }
         let known: Vec<LabelId> = (0..6).collect();
-        let asked = |name: &str| meaning(&Name::new(name).unwrap(), &ledger, &known);
+        let asked = |name: &str| {
+            meaning(&Name::new(name).unwrap(), &ledger, &|id| known.contains(&id), &|| known.clone())
+        };
         for (name, via, labels) in [
             ("kitchen", "exact", vec![5]),
             ("archive", "kind", vec![0]),
@@ -92,6 +99,6 @@ mod tests {
         }
         assert_eq!(asked("kitschen").suggestions, [5]);
         assert_eq!(asked("lecture hall four").suggestions, [2, 1]);
-        assert_eq!(meaning(&Name::new("lobby").unwrap(), &ledger, &[0]).via, "exact");
+        assert_eq!(meaning(&Name::new("lobby").unwrap(), &ledger, &|id| id == 0, &|| vec![0]).via, "exact");
     }
 }

@@ -1,7 +1,6 @@
 //! Answers: the posterior at one moment, and what it is asked.
 
 pub mod differences;
-pub mod grid;
 mod meaning;
 pub mod query;
 pub mod snapshot;

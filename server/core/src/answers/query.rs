@@ -2,6 +2,7 @@
 
 use crate::edge::PlaceId;
 use crate::geometry::Pose2;
+pub use crate::regions::occupancy::Grid;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -13,6 +14,8 @@ pub enum Query {
     Where {
         /// Name or question.
         text: String,
+        /// Its language (BCP 47); none is English.
+        lang: Option<String>,
     },
     /// All names taught so far.
     Labels,
@@ -160,19 +163,4 @@ pub struct Difference {
     pub weight: f64,
     /// "place 41 is place 7 again, place 60 is new ground".
     pub words: String,
-}
-
-/// Occupancy grid. Row 0 has the lowest y.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Grid {
-    /// Edge of a cell.
-    pub resolution_m: f64,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Pose of the lower left corner in the map.
-    pub map_from_grid: Pose2,
-    /// −1 unknown, 0 free … 100 occupied; row-major.
-    pub cells: Vec<i8>,
 }

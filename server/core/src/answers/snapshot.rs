@@ -1,13 +1,11 @@
 //! The posterior at one moment, immutable: what questions are answered from, over all particles.
 
 use crate::answers::differences::differences;
-use crate::answers::grid::grid;
 use crate::answers::meaning::{Meaning, meaning};
 use crate::answers::query::{
-    Answer, Candidate, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query,
-    WhereAnswer,
+    Answer, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query, WhereAnswer,
 };
-use crate::answers::whereabouts::{Region, SAME_REGION_M, whereabouts};
+use crate::answers::whereabouts::{Region, whereabouts};
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
 use crate::filter::Filter;
@@ -16,13 +14,14 @@ use crate::filter::particle::Particle;
 use crate::filter::prune::effective_sample_size;
 use crate::geometry::Pose2;
 use crate::graph::Place;
-use crate::language::act::{About, Head, Question};
-use crate::language::{self, Content, Name};
+use crate::language::act::{About, Act, Head, Question};
+use crate::language::{Content, Name, Speech};
+use crate::regions;
+use crate::regions::occupancy::grid;
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::places::OpenPlace;
-use nalgebra::Matrix3;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Candidates told.
@@ -100,7 +99,7 @@ impl Snapshot {
     /// Answers a question; never fails: not knowing is an answer.
     pub fn answer(&self, query: &Query) -> Answer {
         match query {
-            Query::Where { text } => Answer::Where(self.where_is(text)),
+            Query::Where { text, lang } => Answer::Where(self.where_is(text, lang.as_deref())),
             Query::Labels => Answer::Labels(self.labels()),
             Query::Graph => Answer::Graph(self.graph()),
             Query::Grid { resolution_m } => Answer::Grid(self.grid(*resolution_m)),
@@ -112,6 +111,13 @@ impl Snapshot {
         let posed: Vec<(Pose2, Arc<Place>)> =
             self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
         grid(&posed, resolution_m)
+    }
+
+    /// Regions of the best graph.
+    pub fn regions(&self) -> Vec<regions::Region> {
+        let posed: Vec<(Pose2, Arc<Place>)> =
+            self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
+        regions::regions(&posed)
     }
 
     /// All graphs; places as in the best.
@@ -224,9 +230,24 @@ impl Snapshot {
     }
 
     /// "Where is the gym?": over all particles, which place is meant.
-    fn where_is(&self, text: &str) -> WhereAnswer {
-        let found = language::parse_query(text).map(|name| self.where_named(&name));
+    fn where_is(&self, text: &str, lang: Option<&str>) -> WhereAnswer {
+        let name = self.speech(lang).and_then(|speech| speech.parse_query(text));
+        let found = name.map(|name| self.where_named(&name));
         WhereAnswer { text: text.to_owned(), ..found.unwrap_or_else(|| self.nowhere(None)) }
+    }
+
+    fn speech(&self, lang: Option<&str>) -> Option<Speech> {
+        Speech::new(lang, self.ledger.glossary.clone())
+    }
+
+    /// Whether a question is about the robot's own place: "where am I?" Who is lost can't be told.
+    pub fn is_of_robot(&self, query: &Query) -> bool {
+        let Query::Where { text, lang } = query else { return false };
+        let of_here = |act: &Act| match &act.content {
+            Content::Ask { kind: Question::Where, about: About::Phrase(phrase) } => phrase.head == Head::Here,
+            _ => false,
+        };
+        self.speech(lang.as_deref()).is_some_and(|speech| speech.parse(text).acts().iter().any(of_here))
     }
 
     fn nowhere(&self, name: Option<&Name>) -> WhereAnswer {
@@ -245,13 +266,14 @@ impl Snapshot {
 
     /// Where is what people may mean by a name.
     pub(crate) fn where_named(&self, name: &Name) -> WhereAnswer {
-        let Meaning { via, p, labels, suggestions } = meaning(name, &self.ledger, &self.known());
+        let Meaning { via, p, labels, suggestions } =
+            meaning(name, &self.ledger, &|label| self.is_known(label), &|| self.known());
         let names = |ids: Vec<LabelId>| ids.iter().map(|&id| self.ledger.name(id).to_owned()).collect();
         let (via, suggestions) = (via.to_owned(), names(suggestions));
         let mut answer = WhereAnswer { via, suggestions, ..self.nowhere(Some(name)) };
-        let poses = |p: &Particle| poses(p, &self.places, &self.open);
+        let pose = |p: &Particle, v: Vertex| self.pose(p, v);
         let found = |&label: &LabelId| {
-            let found = whereabouts(&self.particles, poses, label, PROBABILITY_MIN);
+            let found = whereabouts(&self.particles, &pose, label, PROBABILITY_MIN);
             (label, found.regions, found.p_none)
         };
         let found: Vec<(LabelId, Vec<Region>, f64)> = labels.iter().map(found).collect();
@@ -271,11 +293,31 @@ impl Snapshot {
         answer
     }
 
+    /// Pose of a place, or of one that is not frozen yet, in a particle's map.
+    fn pose(&self, p: &Particle, v: Vertex) -> Option<Pose2> {
+        let frozen = p.belief.len();
+        if (v as usize) < frozen {
+            return Some(p.belief.pose(v));
+        }
+        open_poses(p, &self.places, &self.open).get(v as usize - frozen).copied()
+    }
+
+    /// Whether something speaks for a name.
+    fn is_known(&self, label: LabelId) -> bool {
+        let mut evidence = self.particles.iter().flat_map(|p| p.labels.evidence());
+        evidence.any(|e| e.label == label && e.weight > 0.0) && !self.ledger.name(label).is_empty()
+    }
+
     /// Names that something speaks for, in the order first said.
     fn known(&self) -> Vec<LabelId> {
-        let evidence = self.particles.iter().flat_map(|p| p.labels.evidence());
-        let known: BTreeSet<LabelId> = evidence.filter(|e| e.weight > 0.0).map(|e| e.label).collect();
-        known.into_iter().filter(|&id| !self.ledger.name(id).is_empty()).collect()
+        let mut known = vec![false; self.ledger.names().len()];
+        for e in self.particles.iter().flat_map(|p| p.labels.evidence()).filter(|e| e.weight > 0.0) {
+            if let Some(known) = known.get_mut(e.label as usize) {
+                *known = true;
+            }
+        }
+        let ids = (0..known.len()).filter(|&id| known[id]).map(|id| id as LabelId);
+        ids.filter(|&id| !self.ledger.name(id).is_empty()).collect()
     }
 
     /// Names of places so near a pose of the best map, but for one, each with the most that it applies to any of
@@ -304,62 +346,6 @@ impl Snapshot {
     fn resolved(&self) -> f64 {
         1.0 - self.unresolved
     }
-
-    fn candidate(&self, label: LabelId, Region { place, p_is, probability }: Region) -> Candidate {
-        Candidate {
-            place: PlaceId::from(place),
-            label: self.ledger.name(label).to_owned(),
-            shown: self.ledger.spelled(self.ledger.name(label)).to_owned(),
-            probability,
-            p_is,
-            pose: self.poses[place as usize],
-            covariance: self.covariance(place),
-            because: self.because(label, place),
-        }
-    }
-
-    /// Spread of a place over the posterior, best particle's map axes: its own covariance there and
-    /// that of its position relative to the robot between particles.
-    fn covariance(&self, v: Vertex) -> Matrix3<f64> {
-        let best = &self.particles[0].belief;
-        let Some(last) = (best.len() as Vertex).checked_sub(1) else { return Matrix3::zeros() };
-        let known = v.min(last);
-        let mut sum = in_map_axes(&best.pose(known), &best.marginal(&self.structure, known));
-        if v > last {
-            return sum;
-        }
-        let here = best.pose(last);
-        for p in self.particles.iter().skip(1) {
-            let there = here.compose(&p.belief.pose(last).between(&p.belief.pose(v)));
-            let (dx, dy) = (there.x_m - self.poses[v as usize].x_m, there.y_m - self.poses[v as usize].y_m);
-            let spread = Matrix3::new(dx * dx, dx * dy, 0.0, dx * dy, dy * dy, 0.0, 0.0, 0.0, 0.0);
-            sum += p.weight() * spread;
-        }
-        sum
-    }
-
-    fn because(&self, label: LabelId, v: Vertex) -> Vec<String> {
-        let mut ids: Vec<String> = Vec::new();
-        for e in self.particles[0].labels.evidence() {
-            let near = self.poses[e.place as usize].distance_m(&self.poses[v as usize]) < SAME_REGION_M;
-            if e.label == label && near {
-                let id = self.ledger.entries().get(e.utterance as usize).map_or("", |u| &u.id);
-                if !ids.iter().any(|known| known == id) {
-                    ids.push(id.to_owned());
-                }
-            }
-        }
-        ids
-    }
-}
-
-/// Whether a question is about the robot's own place: "where am I?" Who is lost can't be told.
-pub fn asks_of_robot(text: &str) -> bool {
-    let of_here = |content: &Content| match content {
-        Content::Ask { kind: Question::Where, about: About::Phrase(phrase) } => phrase.head == Head::Here,
-        _ => false,
-    };
-    language::parse(text).acts().iter().any(|act| of_here(&act.content))
 }
 
 /// Poses of all places, open ones too, in a particle's map.
@@ -367,13 +353,6 @@ fn poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Vec<Pose2> 
     let mut poses = p.belief.poses();
     poses.extend(open_poses(p, places, open));
     poses
-}
-
-/// Covariance of a right perturbation as that of (x, y, yaw) along the map's axes.
-fn in_map_axes(pose: &Pose2, covariance: &Matrix3<f64>) -> Matrix3<f64> {
-    // The adjoint of a pure rotation.
-    let a = Pose2::new(0.0, 0.0, pose.yaw_rad).adjoint();
-    a * covariance * a.transpose()
 }
 
 /// Poses, in a particle's map, of the places that are not frozen yet.
@@ -387,5 +366,6 @@ pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Ve
     open.iter().map(|o| map_from_front.compose(&o.front_from_place)).collect()
 }
 
+mod candidate;
 #[cfg(test)]
 mod tests;

@@ -41,15 +41,15 @@ pub struct Whereabouts {
     pub p_none: f64,
 }
 
-/// Where a name applies; `poses` of a particle's places, those not frozen yet included. What weighs less
-/// than `p_min` founds no region.
+/// Where a name applies; `pose` of a particle's place, or of one that is not frozen yet: only those that something is
+/// said of are asked for. What weighs less than `p_min` founds no region.
 pub fn whereabouts(
     particles: &[Particle],
-    poses: impl Fn(&Particle) -> Vec<Pose2>,
+    pose: &dyn Fn(&Particle, Vertex) -> Option<Pose2>,
     label: LabelId,
     p_min: f64,
 ) -> Whereabouts {
-    let maps: Vec<Map> = particles.iter().map(|p| Map::new(p, poses(p), label)).collect();
+    let maps: Vec<Map> = particles.iter().map(|p| Map::new(p, pose, label)).collect();
     let mut found = Whereabouts { regions: Vec::new(), p_none: 0.0 };
     for map in &maps {
         map.find(&mut found.regions, p_min);
@@ -61,38 +61,42 @@ pub fn whereabouts(
 }
 
 /// What one particle has heard of a name, where it lies in its map.
-struct Map {
+struct Map<'a> {
+    particle: &'a Particle,
+    pose: &'a dyn Fn(&Particle, Vertex) -> Option<Pose2>,
     weight: f64,
-    poses: Vec<Pose2>,
-    /// By utterance.
-    evidence: BTreeMap<u32, Vec<Evidence>>,
+    /// By utterance, each with the pose of its place.
+    evidence: BTreeMap<u32, Vec<(Pose2, Evidence)>>,
 }
 
-impl Map {
-    fn new(particle: &Particle, poses: Vec<Pose2>, label: LabelId) -> Self {
-        let wanted = |e: &&Evidence| {
-            e.label == label
-                && !matches!(e.source, Source::Carried | Source::Tied)
-                && (e.place as usize) < poses.len()
-        };
-        let mut evidence: BTreeMap<u32, Vec<Evidence>> = BTreeMap::new();
+impl<'a> Map<'a> {
+    fn new(
+        particle: &'a Particle,
+        pose: &'a dyn Fn(&Particle, Vertex) -> Option<Pose2>,
+        label: LabelId,
+    ) -> Self {
+        let wanted = |e: &&Evidence| e.label == label && !matches!(e.source, Source::Carried | Source::Tied);
+        let mut evidence: BTreeMap<u32, Vec<(Pose2, Evidence)>> = BTreeMap::new();
         for e in particle.labels.evidence().iter().filter(wanted) {
-            evidence.entry(e.utterance).or_default().push(*e);
+            if let Some(at) = pose(particle, e.place) {
+                evidence.entry(e.utterance).or_default().push((at, *e));
+            }
         }
-        Self { weight: particle.weight(), poses, evidence }
+        Self { particle, pose, weight: particle.weight(), evidence }
     }
 
-    fn distance_m(&self, a: Vertex, b: Vertex) -> f64 {
-        self.poses[a as usize].distance_m(&self.poses[b as usize])
+    /// Of a place that some map has.
+    fn pose(&self, v: Vertex) -> Pose2 {
+        (self.pose)(self.particle, v).unwrap_or_default()
     }
 
     /// All that speaks for the name at a place: of what each utterance says, by how much of it holds there.
     fn spoken(&self, at: Vertex) -> Spoken {
-        let mut spoken = Spoken::default();
+        let (at, mut spoken) = (self.pose(at), Spoken::default());
         for of_utterance in self.evidence.values() {
             let (mut said, mut denied, mut described) = (0.0_f64, 0.0_f64, 0.0);
-            for e in of_utterance {
-                let holds = e.weight * share(self.distance_m(at, e.place));
+            for (place, e) in of_utterance {
+                let holds = e.weight * share(at.distance_m(place));
                 match e.source {
                     Source::Grounded => described += holds,
                     Source::Denied => denied = denied.max(-holds),
@@ -110,7 +114,7 @@ impl Map {
     /// than in the midst of what joins there.
     fn sites(&self) -> Vec<Vertex> {
         let mut own: BTreeMap<Vertex, Spoken> = BTreeMap::new();
-        for e in self.evidence.values().flatten() {
+        for (_, e) in self.evidence.values().flatten() {
             take_up(own.entry(e.place).or_default(), e);
         }
         let sites = own.into_iter().map(|(v, spoken)| (v, spoken.applies()));
@@ -130,11 +134,13 @@ impl Map {
     }
 
     fn is_in(&self, regions: &[Region], v: Vertex) -> bool {
-        regions.iter().any(|r| self.distance_m(r.place, v) < SAME_REGION_M)
+        let at = self.pose(v);
+        regions.iter().any(|r| self.pose(r.place).distance_m(&at) < SAME_REGION_M)
     }
 
     /// Adds this particle's share to all regions and to none.
     fn share_out(&self, found: &mut Whereabouts) {
+        let poses: Vec<Pose2> = found.regions.iter().map(|r| self.pose(r.place)).collect();
         let spoken: Vec<Spoken> = found.regions.iter().map(|r| self.spoken(r.place)).collect();
         // What other maps take apart may be one region in this.
         let mut kept: Vec<usize> = Vec::new();
@@ -142,9 +148,7 @@ impl Map {
             region.p_is += self.weight * spoken[k].applies();
         }
         for k in 0..spoken.len() {
-            let known =
-                |&o: &usize| self.distance_m(found.regions[o].place, found.regions[k].place) < SAME_REGION_M;
-            if !kept.iter().any(known) {
+            if !kept.iter().any(|&o| poses[o].distance_m(&poses[k]) < SAME_REGION_M) {
                 kept.push(k);
             }
         }
@@ -160,9 +164,9 @@ impl Map {
     /// anywhere. A description means one place, so its places are no witnesses of one another.
     fn nowhere(&self, regions: impl Iterator<Item = Spoken>) -> f64 {
         let unsaid: f64 = regions.map(|spoken| 1.0 - spoken.tally.told()).product();
-        let put = |of_utterance: &Vec<Evidence>| {
-            let grounded = of_utterance.iter().filter(|e| e.source == Source::Grounded);
-            grounded.map(|e| e.weight).sum::<f64>().clamp(0.0, 1.0)
+        let put = |of_utterance: &Vec<(Pose2, Evidence)>| {
+            let grounded = of_utterance.iter().filter(|(_, e)| e.source == Source::Grounded);
+            grounded.map(|(_, e)| e.weight).sum::<f64>().clamp(0.0, 1.0)
         };
         self.evidence.values().map(|of| 1.0 - put(of)).product::<f64>() * unsaid
     }
@@ -186,11 +190,11 @@ mod tests {
                 p
             })
             .collect();
-        let poses = |p: &Particle| {
+        let pose = |p: &Particle, v: Vertex| {
             let k = maps.iter().position(|m| (m.0 - p.weight()).abs() < 1e-9).unwrap();
-            maps[k].1.iter().map(|&x_m| Pose2::new(x_m, 0.0, 0.0)).collect()
+            maps[k].1.get(v as usize).map(|&x_m| Pose2::new(x_m, 0.0, 0.0))
         };
-        whereabouts(&particles, poses, 0, 0.02)
+        whereabouts(&particles, &pose, 0, 0.02)
     }
 
     fn direct(utterance: u32, place: Vertex) -> Evidence {

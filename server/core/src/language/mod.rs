@@ -21,6 +21,7 @@ pub mod act;
 mod agreement;
 pub(crate) mod clauses;
 mod ellipsis;
+pub mod glossary;
 pub(crate) mod grammar;
 pub(crate) mod grounding;
 pub(crate) mod lexicon;
@@ -32,6 +33,7 @@ pub mod reader;
 mod reference;
 mod relation;
 mod reply;
+pub mod speech;
 mod spelling;
 #[cfg(test)]
 mod tests;
@@ -40,7 +42,7 @@ mod words;
 
 pub use act::{Act, Analysis, Content, Frame, Parse, Phrase, Sameness};
 pub use clauses::{Clause, clauses};
-pub use ellipsis::as_before;
+pub use glossary::Glossary;
 pub use grammar::ask::asked_name;
 pub use grounding::clause::{LandmarkBelief, Narrowing, Reading};
 pub use grounding::footprint::Footprint;
@@ -58,9 +60,9 @@ pub use likeness::{is_of_kind, misheard, synonyms};
 pub use phrases::{names_in, renamed};
 pub use reference::{pointed_to, resolve_it, seen_from_here, topic};
 pub use relation::Relation;
-pub use reply::{Reply, reply};
-pub use spelling::spelling;
-pub use understand::{guess, parse, parse_by, parse_hearings, parse_query};
+pub use reply::Reply;
+pub use speech::Speech;
+pub use understand::{parse, parse_by};
 pub use words::{NOT_UNDERSTOOD, statement, words};
 
 /// An act in writing.

@@ -5,7 +5,7 @@ use crate::language::lexicon::names::Name;
 use crate::language::notation::notation;
 
 /// Does something to each phrase, landmarks of landmarks included.
-fn each_phrase(content: &mut Content, of: &mut impl FnMut(&mut Phrase)) {
+pub(super) fn each_phrase(content: &mut Content, of: &mut impl FnMut(&mut Phrase)) {
     match content {
         Content::Label { at: a, what: b, .. }
         | Content::Alias { what: a, also: b }

@@ -6,21 +6,22 @@ use crate::language::lexicon::names::{MAX_NAME_WORDS, Name};
 const BEFORE: [&str; 9] = ["the", "a", "an", "our", "my", "your", "his", "her", "their"];
 
 /// A name as it stands in a text; none if it is spelled there as the map spells it, or is written in capitals
-/// throughout, as some recognisers do.
-pub fn spelling(text: &str, name: &Name) -> Option<String> {
+/// throughout, as some recognisers do. `nouns`: whether nouns have a capital wherever they stand; `read`: the name that
+/// some words are.
+pub fn spelling(text: &str, name: &Name, nouns: bool, read: impl Fn(&str) -> Option<Name>) -> Option<String> {
     if !text.chars().any(char::is_lowercase) && text.is_ascii() {
         return None;
     }
     let words: Vec<&str> = text.split_whitespace().collect();
     let is_it = |of: &[&str]| {
-        !BEFORE.contains(&of[0].to_lowercase().as_str()) && Name::new(&trimmed(of)).as_ref() == Some(name)
+        !BEFORE.contains(&of[0].to_lowercase().as_str()) && read(&trimmed(of)).as_ref() == Some(name)
     };
     let found = (1..=MAX_NAME_WORDS).flat_map(|n| words.windows(n)).find(|w| is_it(w))?;
     let mut spelled = trimmed(found);
     // A sentence begins with a capital, which is none of the name's unless that has others or tells whose it is.
     let begins = found.as_ptr() == words.as_ptr();
     let others = spelled.chars().skip(1).any(char::is_uppercase) || spelled.contains(['\'', '’']);
-    if begins && !others {
+    if begins && !others && !nouns {
         spelled = spelled.to_lowercase();
     }
     (spelled != name.as_str()).then_some(spelled)
@@ -51,7 +52,7 @@ mod tests {
             ("this is the gym", "lounge", None),
         ] {
             let name = Name::new(name).unwrap();
-            assert_eq!(spelling(text, &name).as_deref(), shown, "{text}");
+            assert_eq!(spelling(text, &name, false, Name::new).as_deref(), shown, "{text}");
         }
     }
 }

@@ -1,12 +1,15 @@
 //! What sentences say, as a whole. `golden.jsonl` is a table of our own sentences; the example `parse`
 //! scores such tables.
 
+mod german;
 mod reference;
+mod site;
 mod spoken;
 mod words;
 
 use super::*;
 use crate::language::act::{Content, Head, Locate};
+use crate::language::understand::{parse_hearings, parse_query};
 use proptest::prelude::*;
 
 fn read(text: &str) -> String {

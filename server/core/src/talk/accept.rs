@@ -49,7 +49,7 @@ pub(crate) fn take(
         return (heard(u, HeardStatus::Refused, &parse, words), asks);
     }
     let (held, stamp_ns) = (said.held, said.stamp_ns);
-    spell(talk, &said.text, &parse);
+    spell(talk, u, &said.text, &parse);
     let entry =
         Entry { id: u.id.clone(), stamp_ns, text: said.text, parse: parse.clone(), held, stands: true };
     let describes = !located(&parse).is_empty();
@@ -65,9 +65,10 @@ pub(crate) fn take(
 }
 
 /// Remembers how the guide spells what is named.
-fn spell(talk: &mut Talk, text: &str, parse: &Parse) {
+fn spell(talk: &mut Talk, u: &Utterance, text: &str, parse: &Parse) {
+    let Some(speech) = talk.speech(u) else { return };
     for name in parse.acts().iter().flat_map(|act| names_in(&act.content)) {
-        if let Some(spelled) = language::spelling(text, &name) {
+        if let Some(spelled) = speech.spelling(text, &name) {
             Arc::make_mut(&mut talk.ledger).spell(&name, spelled);
         }
     }

@@ -53,7 +53,11 @@ fn known(filter: &Filter) -> BTreeSet<LabelId> {
 /// "The sever room": sounds like a name that is known here, or like what places are called.
 fn sounding(ledger: &Ledger, known: &BTreeSet<LabelId>, parse: &Parse, said: &Name) -> Option<Doubt> {
     let here = known.iter().map(|&id| (1.0, ledger.name(id)));
-    let all = here.chain(place_names().map(|name| (UNNAMED, name)));
+    let of_site = ledger.glossary.names().map(|name| (1.0, name.as_str()));
+    if ledger.glossary.names().any(|name| name == said) {
+        return None;
+    }
+    let all = here.chain(of_site).chain(place_names().map(|name| (UNNAMED, name)));
     let likely = all.map(|(p, name)| (p * misheard(said.as_str(), name), name));
     let (p, name) = likely.filter(|(p, _)| *p >= ASKED_MIN).max_by(|a, b| a.0.total_cmp(&b.0))?;
     let meant = Name::new(name)?;

@@ -4,10 +4,11 @@
 use crate::edge::Vertex;
 use crate::event::StampNs;
 use crate::filter::labels::LabelId;
-use crate::language::Name;
 use crate::language::act::Parse;
+use crate::language::{Glossary, Name};
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet, VecDeque};
+use std::sync::Arc;
 
 /// Sentences taken in; beyond, none is.
 pub const UTTERANCES_MAX: usize = 20_000;
@@ -45,8 +46,12 @@ pub struct Ledger {
     aliases: BTreeMap<LabelId, (LabelId, Option<u32>)>,
     /// Names that nothing said before an utterance speaks of any more.
     forgotten: BTreeMap<LabelId, u32>,
+    /// Words of the site's own.
+    pub glossary: Arc<Glossary>,
     /// How guides spell names that have capitals or other signs.
     spelled: BTreeMap<String, String>,
+    /// Names by what they are spelled as, where that reads as another name: "kuche", a kitchen.
+    by_spelling: BTreeMap<String, String>,
     entries: Vec<Entry>,
     ids: BTreeSet<String>,
     /// Utterances that describe, oldest first.
@@ -78,6 +83,11 @@ impl Ledger {
     /// A name as guides spell it: "Nick's Office".
     pub fn spelled<'a>(&'a self, name: &'a str) -> &'a str {
         self.spelled.get(name).map_or(name, String::as_str)
+    }
+
+    /// A name by how guides spell it, as that reads: maybe in another language.
+    pub fn spelled_so(&self, spelled: &str) -> Option<LabelId> {
+        self.by_spelling.get(spelled).and_then(|name| self.label(name))
     }
 
     /// Whether a name is that of a way, such as every building has.
@@ -152,6 +162,9 @@ impl Ledger {
 
     /// From now on a name is spelled so.
     pub(crate) fn spell(&mut self, name: &Name, spelled: String) {
+        if let Some(read) = Name::new(&spelled).filter(|read| read != name) {
+            self.by_spelling.insert(read.as_str().to_owned(), name.as_str().to_owned());
+        }
         self.spelled.insert(name.as_str().to_owned(), spelled);
     }
 

@@ -4,7 +4,7 @@ use crate::effects::{Heard, HeardStatus};
 use crate::event::{StampNs, Utterance};
 use crate::filter::Filter;
 use crate::language::act::{Act, Analysis, Content, Parse, Phrase};
-use crate::language::{self, Name, Reply};
+use crate::language::{self, Name, Reply, Speech};
 use crate::talk::accept::{asked, heard, take, words};
 use crate::talk::doubts::doubted;
 use crate::talk::ledger::Entry;
@@ -36,8 +36,12 @@ pub(crate) fn hear(
     if let Some(question) = talk.questions.about(&u.id) {
         return (asked(u, &Parse::default(), question.words.clone()), Vec::new());
     }
+    let Some(speech) = talk.speech(u) else {
+        let words = format!("I understand {} only.", Speech::known());
+        return (heard(u, HeardStatus::NotUnderstood, &Parse::default(), words), Vec::new());
+    };
     if talk.ledger.has(&u.id) {
-        let parse = language::parse_hearings(&u.text, &u.alternatives);
+        let parse = speech.parse_hearings(&u.text, &u.alternatives);
         let words = format!("{} (I had heard that already.)", words(talk, &parse));
         return (heard(u, HeardStatus::Understood, &parse, words), Vec::new());
     }
@@ -45,10 +49,10 @@ pub(crate) fn hear(
         .retracts
         .as_ref()
         .map(|id| undo(talk, filter, Some(id)).unwrap_or_else(|why| format!("But {why}.")));
-    let (mut heard, asks) = match talk.questions.answered(u) {
+    let (mut heard, asks) = match talk.questions.answered(u, &speech) {
         Some((question, then)) => answered(talk, filter, u, here, (&question, then)),
-        None if language::reply(&u.text) == Some(Reply::Undo) => (undone(talk, filter, u, here), Vec::new()),
-        None => hear_anew(talk, filter, u, here),
+        None if speech.reply(&u.text) == Some(Reply::Undo) => (undone(talk, filter, u, here), Vec::new()),
+        None => hear_anew(talk, filter, (u, &speech), here),
     };
     if let Some(retracted) = retracted {
         heard.words = format!("{retracted} {}", heard.words);
@@ -56,8 +60,13 @@ pub(crate) fn hear(
     (heard, asks)
 }
 
-fn hear_anew(talk: &mut Talk, filter: &mut Filter, u: &Utterance, here: &Here) -> (Heard, Vec<Content>) {
-    let mut parse = language::parse_hearings(&u.text, &u.alternatives);
+fn hear_anew(
+    talk: &mut Talk,
+    filter: &mut Filter,
+    (u, speech): (&Utterance, &Speech),
+    here: &Here,
+) -> (Heard, Vec<Content>) {
+    let mut parse = speech.parse_hearings(&u.text, &u.alternatives);
     language::resolve_it(&mut parse, topic(talk, u.began_ns));
     let said = |parse, held, instead_of| {
         let (text, stamp_ns) = (u.text.clone(), u.began_ns);
@@ -65,17 +74,17 @@ fn hear_anew(talk: &mut Talk, filter: &mut Filter, u: &Utterance, here: &Here) -
     };
     let newest = newest(talk, u.began_ns);
     if parse.acts().is_empty()
-        && let Some(said_before) = newest.and_then(|e| language::as_before(&u.text, &e.parse))
+        && let Some(said_before) = newest.and_then(|e| speech.as_before(&u.text, &e.parse))
     {
         parse = said_before;
     }
     if parse.acts().is_empty()
-        && let Some(mended) = newest.and_then(|e| mended(&u.text, e, u.began_ns))
+        && let Some(mended) = newest.and_then(|e| mended((&u.text, speech), e, u.began_ns))
     {
         parse.analyses.push(mended);
     }
     if parse.acts().iter().all(|act| matches!(act.content, Content::Ignored(_))) {
-        if let (Some(guess), Some(held)) = (language::guess(&u.text), here.held) {
+        if let (Some(guess), Some(held)) = (speech.guess(&u.text), here.held) {
             let words = did_you_mean(&guess);
             let mut parse = Parse { analyses: vec![guess] };
             language::resolve_it(&mut parse, topic(talk, u.began_ns));
@@ -129,11 +138,11 @@ fn topic(talk: &Talk, now_ns: StampNs) -> Option<&Phrase> {
 }
 
 /// "No wait, the reading room": by itself it may say anything; just after a place was named it mends that.
-fn mended(text: &str, before: &Entry, now_ns: StampNs) -> Option<Analysis> {
+fn mended((text, speech): (&str, &Speech), before: &Entry, now_ns: StampNs) -> Option<Analysis> {
     let is_label = |act: &Act| matches!(act.content, Content::Label { .. });
     let just_named =
         before.parse.acts().iter().any(is_label) && now_ns.saturating_sub(before.stamp_ns) <= MENDED_NS;
-    let guess = language::guess(text).filter(|_| just_named)?;
+    let guess = speech.guess(text).filter(|_| just_named)?;
     let mends = |act: &Act| match &act.content {
         Content::Correct { is, .. } => matches!(**is, Content::Label { .. }),
         _ => false,

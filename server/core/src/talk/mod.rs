@@ -28,7 +28,7 @@ use crate::filter::particle::Particle;
 use crate::filter::words::Words;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
-use crate::language::Content;
+use crate::language::{Content, Glossary, Speech};
 use claims::Testimonies;
 use ledger::Ledger;
 use questions::Questions;
@@ -71,6 +71,18 @@ impl Talk {
     /// in it, to be answered from the map.
     pub fn hear(&mut self, filter: &mut Filter, u: &Utterance, here: &Here) -> (Heard, Vec<Content>) {
         listen::hear(self, filter, u, here)
+    }
+
+    /// What a sentence is said in; none if nobody here knows that language.
+    fn speech(&self, u: &Utterance) -> Option<Speech> {
+        Speech::new(u.lang.as_deref(), self.ledger.glossary.clone())
+    }
+
+    /// Takes the site's own words, in the place of those before; what was heard before stays as it was understood.
+    pub fn learn(&mut self, lines: &str) {
+        if let Ok(glossary) = Glossary::read(lines) {
+            Arc::make_mut(&mut self.ledger).glossary = Arc::new(glossary);
+        }
     }
 
     /// Does what an operator asks, and tells what was done or why not.

@@ -4,7 +4,7 @@
 use crate::edge::Vertex;
 use crate::event::{StampNs, Utterance};
 use crate::language::act::Parse;
-use crate::language::{Name, Reply, parse_query, reply};
+use crate::language::{Name, Reply, Speech};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 
@@ -74,7 +74,7 @@ impl Questions {
 
     /// The question that a sentence answers, with what the answer does; it waits no longer. None if the sentence
     /// answers none: what it speaks of instead is not asked of any more.
-    pub fn answered(&mut self, u: &Utterance) -> Option<(Question, Then)> {
+    pub fn answered(&mut self, u: &Utterance, speech: &Speech) -> Option<(Question, Then)> {
         let at = if let Some(id) = &u.answers {
             self.0.iter().position(|q| q.id == *id)
         } else {
@@ -82,9 +82,9 @@ impl Questions {
             self.0.iter().rposition(|q| (0..=ANSWERED_NS).contains(&since_ns(q)))
         };
         let question = self.0.get(at?)?;
-        let named = parse_query(&u.text);
+        let named = speech.parse_query(&u.text);
         let is_named = |k: usize| named.is_some() && question.names[k] == named;
-        let answer = match reply(&u.text) {
+        let answer = match speech.reply(&u.text) {
             Some(Reply::Yes) => 0,
             Some(Reply::No) => 1,
             _ if is_named(0) => 0,

@@ -48,7 +48,7 @@ fn worst_error_m(mapper: &Mapper, effects: &Effects, poses: &[Pose2]) -> f64 {
 }
 
 fn where_is(mapper: &Mapper, text: &str) -> WhereAnswer {
-    match mapper.answer(&Query::Where { text: text.into() }) {
+    match mapper.answer(&Query::Where { text: text.into(), lang: None }) {
         Answer::Where(answer) => answer,
         other => panic!("{other:?}"),
     }

@@ -155,6 +155,7 @@ pub fn say(id: &str, text: &str, began_ns: i64) -> Utterance {
     Utterance {
         id: id.into(),
         text: text.into(),
+        lang: None,
         alternatives: vec![],
         speaker: None,
         began_ns,

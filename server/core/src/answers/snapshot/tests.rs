@@ -2,6 +2,7 @@ use super::*;
 use crate::config::Config;
 use crate::edge::EdgeKind;
 use crate::filter::particle::Edge;
+use nalgebra::Matrix3;
 
 /// Two graphs, and a quarter of the posterior is neither.
 fn torn(state: TrackState) -> Snapshot {
@@ -35,7 +36,7 @@ fn weights_sum_to_one_with_what_is_unresolved() {
 
 #[test]
 fn an_answer_leaves_what_is_unresolved_to_nowhere() {
-    let answer = torn(TrackState::Doubtful).where_is("gym");
+    let answer = torn(TrackState::Doubtful).where_is("gym", None);
     assert_eq!((answer.p_none, answer.unresolved), (1.0, 0.25));
 }
 
@@ -44,7 +45,7 @@ fn only_who_is_lost_is_nowhere() {
     for (state, known) in
         [(TrackState::Mapping, true), (TrackState::Doubtful, true), (TrackState::Lost, false)]
     {
-        assert_eq!(torn(state).where_is("gym").robot.is_some(), known);
+        assert_eq!(torn(state).where_is("gym", None).robot.is_some(), known);
     }
 }
 
@@ -57,6 +58,7 @@ fn where_am_i_asks_for_the_robot_and_nothing_else_does() {
         ("gym", false),
         ("how do I get to the library from here", false),
     ] {
-        assert_eq!(asks_of_robot(text), of_robot, "{text}");
+        let query = Query::Where { text: text.into(), lang: None };
+        assert_eq!(torn(TrackState::Lost).is_of_robot(&query), of_robot, "{text}");
     }
 }

@@ -12,7 +12,7 @@
 mod chunks;
 pub mod decide;
 pub mod features;
-mod forms;
+pub(super) mod forms;
 pub mod groups;
 pub mod judge;
 pub mod kind;

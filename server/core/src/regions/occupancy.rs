@@ -1,10 +1,25 @@
 //! Occupancy grid of the best particle, on demand: counting hits and passes along each ray of the
 //! places' range images (Moravec and Elfes 1985, in log-odds).
 
-use crate::answers::query::Grid;
 use crate::geometry::Pose2;
 use crate::graph::Place;
+use serde::{Deserialize, Serialize};
 use std::sync::Arc;
+
+/// Occupancy grid. Row 0 has the lowest y.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Grid {
+    /// Edge of a cell.
+    pub resolution_m: f64,
+    /// Columns.
+    pub width: usize,
+    /// Rows.
+    pub height: usize,
+    /// Pose of the lower left corner in the map.
+    pub map_from_grid: Pose2,
+    /// −1 unknown, 0 free … 100 occupied; row-major.
+    pub cells: Vec<i8>,
+}
 
 /// Cells a grid may have at most; beyond, its resolution is made coarser.
 pub const CELLS_MAX: usize = 16_000_000;
@@ -13,6 +28,10 @@ pub const RESOLUTION_MIN_M: f64 = 0.02;
 const HIT: i16 = 6;
 const PASS: i16 = -2;
 const CLAMP: i16 = 60;
+/// A robot is no narrower, from its middle.
+const ROBOT_M: f64 = 0.2;
+/// Places that follow each other lie no farther apart.
+const STRIDE_MAX_M: f64 = 3.0;
 /// Room around the outermost points.
 const MARGIN_M: f64 = 1.0;
 
@@ -61,6 +80,16 @@ pub fn grid(places: &[(Pose2, Arc<Place>)], resolution_m: f64) -> Grid {
             board.add(cx, cy, HIT);
         }
     }
+    // Where the robot drove nothing stands: people who walked with it leave traces there.
+    for pair in places.windows(2).filter(|pair| pair[0].1.segment == pair[1].1.segment) {
+        let (a, b) = (pair[0].0, pair[1].0);
+        let steps = (a.distance_m(&b).min(STRIDE_MAX_M) / resolution_m).ceil().max(1.0);
+        for k in 0..=steps as usize {
+            let share = k as f64 / steps;
+            let (x, y) = (a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m));
+            board.drive(to_cell(x, y), (ROBOT_M / resolution_m) as i64);
+        }
+    }
     Grid { resolution_m, width, height, map_from_grid: Pose2::new(x0, y0, 0.0), cells: board.percentages() }
 }
 
@@ -83,6 +112,15 @@ impl Board {
         let k = y as usize * self.width + x as usize;
         self.odds[k] = (self.odds[k] + change).clamp(-CLAMP, CLAMP);
         self.known[k] = true;
+    }
+
+    /// A robot stood here.
+    fn drive(&mut self, (x, y): (i64, i64), reach: i64) {
+        for (dx, dy) in (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy))) {
+            if dx * dx + dy * dy <= reach * reach {
+                self.add(x + dx, y + dy, -2 * CLAMP);
+            }
+        }
     }
 
     /// Bresenham, the last cell excepted.

@@ -1,0 +1,97 @@
+//! What is free, by all that the places of a map have seen.
+
+use super::occupancy::grid;
+use crate::geometry::Pose2;
+use crate::graph::Place;
+use std::sync::Arc;
+
+/// Edge of a cell: walls are thicker, doorways far wider.
+const RESOLUTION_M: f64 = 0.1;
+/// From such a percentage on something stands there.
+const OCCUPIED: i8 = 50;
+/// What stands free and is smaller, people and pillars say, parts no space.
+const CLUTTER_M2: f64 = 0.5;
+/// A place lies in what is free so near to it.
+const NEAR_M: f64 = 0.5;
+
+/// Free cells, row by row.
+pub struct Raster {
+    pub width: usize,
+    pub height: usize,
+    pub resolution_m: f64,
+    /// The lower left corner in the map.
+    pub corner_m: (f64, f64),
+    pub free: Vec<bool>,
+}
+
+impl Raster {
+    /// None of a map that has seen nothing.
+    pub fn new(places: &[(Pose2, Arc<Place>)]) -> Option<Self> {
+        let grid = grid(places, RESOLUTION_M);
+        let free: Vec<bool> = grid.cells.iter().map(|&c| (0..OCCUPIED).contains(&c)).collect();
+        let corner_m = (grid.map_from_grid.x_m, grid.map_from_grid.y_m);
+        let (width, height, resolution_m) = (grid.width, grid.height, grid.resolution_m);
+        let mut raster = Self { width, height, resolution_m, corner_m, free };
+        raster.clear();
+        raster.free.contains(&true).then_some(raster)
+    }
+
+    /// The cells beside one, with those at its corners or without.
+    pub fn beside(&self, cell: usize, corners: bool) -> impl Iterator<Item = usize> + use<> {
+        let (width, height) = (self.width as i64, self.height as i64);
+        let (x, y) = (cell as i64 % width, cell as i64 / width);
+        let all = [(1, 0), (0, 1), (-1, 0), (0, -1), (1, 1), (-1, 1), (-1, -1), (1, -1)];
+        let count = if corners { 8 } else { 4 };
+        all.into_iter().take(count).filter_map(move |(dx, dy)| {
+            let (x, y) = (x + dx, y + dy);
+            ((0..width).contains(&x) && (0..height).contains(&y)).then_some((y * width + x) as usize)
+        })
+    }
+
+    /// Makes what is not free, but small and with free space all around, free.
+    fn clear(&mut self) {
+        let small = (CLUTTER_M2 / self.resolution_m.powi(2)) as usize;
+        let mut seen = self.free.clone();
+        for first in 0..seen.len() {
+            if std::mem::replace(&mut seen[first], true) {
+                continue;
+            }
+            let (mut thing, mut at) = (vec![first], 0);
+            while at < thing.len() {
+                for next in self.beside(thing[at], true) {
+                    if !std::mem::replace(&mut seen[next], true) {
+                        thing.push(next);
+                    }
+                }
+                at += 1;
+            }
+            if thing.len() <= small {
+                for cell in thing {
+                    self.free[cell] = true;
+                }
+            }
+        }
+    }
+
+    /// Middle of a cell in the map, metres.
+    pub fn middle(&self, cell: usize) -> (f64, f64) {
+        let (x, y) = (cell % self.width, cell / self.width);
+        let along = |from_m: f64, k: usize| from_m + (k as f64 + 0.5) * self.resolution_m;
+        (along(self.corner_m.0, x), along(self.corner_m.1, y))
+    }
+
+    /// What the nearest cell around a point has that has something.
+    pub fn near<T>(&self, x_m: f64, y_m: f64, of: impl Fn(usize) -> Option<T>) -> Option<T> {
+        let to_cell = |m: f64, corner_m: f64| ((m - corner_m) / self.resolution_m).floor() as i64;
+        let (cx, cy) = (to_cell(x_m, self.corner_m.0), to_cell(y_m, self.corner_m.1));
+        let reach = (NEAR_M / self.resolution_m).ceil() as i64;
+        let around = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
+        let mut cells: Vec<(i64, usize)> = around
+            .map(|(dx, dy)| (dx * dx + dy * dy, cx + dx, cy + dy))
+            .filter(|&(_, x, y)| (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y))
+            .map(|(far, x, y)| (far, y as usize * self.width + x as usize))
+            .collect();
+        cells.sort_unstable();
+        cells.into_iter().find_map(|(_, cell)| of(cell))
+    }
+}

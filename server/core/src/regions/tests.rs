@@ -1,0 +1,105 @@
+//! Rooms drawn by hand, and brute force as the oracle of what is clever.
+
+use super::basins::{Parts, basins};
+use super::clearance::clearance;
+use super::outline::outline;
+use super::raster::Raster;
+use proptest::prelude::*;
+
+/// A raster of free rectangles: from x, y on, so wide and so high, cells of 0.1 m.
+fn raster(width: usize, height: usize, rooms: &[(usize, usize, usize, usize)]) -> Raster {
+    let mut free = vec![false; width * height];
+    for &(x, y, w, h) in rooms {
+        for row in y..y + h {
+            free[row * width + x..row * width + x + w].fill(true);
+        }
+    }
+    Raster { width, height, resolution_m: 0.1, corner_m: (0.0, 0.0), free }
+}
+
+fn parts(raster: &Raster) -> (Parts, Vec<f32>) {
+    let clearance = clearance(raster);
+    (basins(raster, &clearance), clearance)
+}
+
+#[test]
+fn rooms_end_at_their_doors() {
+    // Two rooms of 4 m by 3 m at a corridor of 2 m by 12 m that bends, doors of 0.9 m.
+    let doors = [(25, 42, 9, 2), (85, 42, 9, 2)];
+    let corridor = [(2, 22, 120, 20), (102, 22, 20, 80)];
+    let rooms = [(10, 44, 40, 30), (60, 44, 40, 30)];
+    let all: Vec<_> = doors.iter().chain(&corridor).chain(&rooms).copied().collect();
+    let raster = raster(130, 110, &all);
+    let (parts, clearance) = parts(&raster);
+    assert_eq!(parts.count, 3, "{:?}", parts.peak_m);
+    let at = |x: usize, y: usize| parts.of[y * raster.width + x].unwrap();
+    assert!(at(30, 60) != at(80, 60) && at(30, 60) != at(20, 30) && at(80, 60) != at(20, 30));
+    assert_eq!(at(5, 30), at(110, 100), "a bend parts nothing");
+    let at_m = |s: &super::basins::Saddle| (s.of, raster.middle(s.cell), clearance[s.cell]);
+    assert_eq!(parts.saddles.len(), 2, "{:?}", parts.saddles.iter().map(at_m).collect::<Vec<_>>());
+    for s in &parts.saddles {
+        assert!((2.0 * clearance[s.cell] - 0.9).abs() < 0.25, "{}", clearance[s.cell]);
+    }
+}
+
+#[test]
+fn a_corridor_ends_where_a_hall_begins_and_a_niche_is_its_rooms() {
+    let raster = raster(250, 140, &[(2, 60, 100, 18), (102, 10, 140, 120), (30, 78, 12, 6)]);
+    let (parts, _) = parts(&raster);
+    assert_eq!(parts.count, 2, "{:?}", parts.peak_m);
+}
+
+#[test]
+fn an_outline_goes_around_all_cells_and_what_stands_in_them() {
+    let mut raster = raster(60, 60, &[(5, 5, 50, 40)]);
+    for y in 20..30 {
+        raster.free[y * 60 + 20..y * 60 + 30].fill(false);
+    }
+    let cells: Vec<usize> = (0..3600).filter(|&c| raster.free[c]).collect();
+    let outline = outline(&raster, &cells);
+    assert_eq!(outline.polygon_m.len(), 4, "{:?}", outline.polygon_m);
+    assert!((area(&outline.polygon_m) - 20.0).abs() < 1e-9);
+    assert_eq!(outline.holes_m.len(), 1);
+    assert!((area(&outline.holes_m[0]) + 1.0).abs() < 1e-9);
+}
+
+/// Counter-clockwise.
+fn area(line: &[(f64, f64)]) -> f64 {
+    let pairs = (0..line.len()).map(|k| (line[k], line[(k + 1) % line.len()]));
+    pairs.map(|(a, b)| 0.5 * (a.0 * b.1 - a.1 * b.0)).sum()
+}
+
+proptest! {
+    #[test]
+    fn clearance_is_the_distance_to_the_nearest_cell_that_is_not_free(
+        free in prop::collection::vec(prop::bool::weighted(0.8), 7 * 9),
+    ) {
+        let raster = Raster { width: 9, height: 7, resolution_m: 0.1, corner_m: (0.0, 0.0), free };
+        let found = clearance(&raster);
+        for cell in 0..63_i64 {
+            let (x, y) = (cell % 9, cell / 9);
+            let taken = |u: i64, v: i64| {
+                !(0..9).contains(&u) || !(0..7).contains(&v) || !raster.free[(v * 9 + u) as usize]
+            };
+            let all = (-1..10).flat_map(|u| (-1..8).map(move |v| (u, v))).filter(|&(u, v)| taken(u, v));
+            let nearest = all.map(|(u, v)| (u - x).pow(2) + (v - y).pow(2)).min().unwrap();
+            prop_assert!((f64::from(found[cell as usize]) - 0.1 * (nearest as f64).sqrt()).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn every_free_cell_is_in_one_part_and_outlines_hold_as_much_as_their_cells(
+        free in prop::collection::vec(prop::bool::weighted(0.7), 12 * 12),
+    ) {
+        let raster = Raster { width: 12, height: 12, resolution_m: 0.1, corner_m: (0.0, 0.0), free };
+        let (parts, _) = parts(&raster);
+        for cell in 0..144 {
+            prop_assert_eq!(parts.of[cell].is_some(), raster.free[cell]);
+        }
+        for part in 0..parts.count as u32 {
+            let cells = parts.cells(part);
+            prop_assert!(!cells.is_empty());
+            let _ = outline(&raster, &cells);
+        }
+    }
+}
