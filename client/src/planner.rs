@@ -5,6 +5,7 @@ use std::time::Duration;
 use toponym_proto::Mend;
 use toponym_proto::answer::{Done, GraphReply, GridReply, Info, LabelsReply, Mended, WhereReply};
 use toponym_proto::keys::{Ask, Keys, check_id};
+use toponym_proto::regions::RegionsReply;
 use toponym_proto::selector;
 use zenoh::Session;
 
@@ -57,6 +58,14 @@ impl Planner {
         let resolution_m = resolution_m.to_string();
         let arguments = selector::encode([("resolution_m", resolution_m.as_str())]);
         ask(&self.session, &self.keys.ask(&self.map, Ask::Grid), &arguments, self.timeout).await
+    }
+
+    /// Rooms of the best graph: outlines, doorways, names.
+    ///
+    /// # Errors
+    /// If there is no such map, or no answer in time.
+    pub async fn regions(&self) -> Result<RegionsReply, ClientError> {
+        ask(&self.session, &self.keys.ask(&self.map, Ask::Regions), "", self.timeout).await
     }
 
     /// Deletes the map; the server keeps its folder aside. Its robot has to present itself again.

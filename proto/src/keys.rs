@@ -23,11 +23,13 @@ pub enum Ask {
     Graph,
     /// Occupancy.
     Grid,
+    /// Rooms.
+    Regions,
 }
 
 impl Ask {
     /// All there are.
-    pub const ALL: [Self; 4] = [Self::Where, Self::Labels, Self::Graph, Self::Grid];
+    pub const ALL: [Self; 5] = [Self::Where, Self::Labels, Self::Graph, Self::Grid, Self::Regions];
 
     /// Last chunk of the key.
     pub fn as_str(self) -> &'static str {
@@ -36,6 +38,7 @@ impl Ask {
             Self::Labels => "labels",
             Self::Graph => "graph",
             Self::Grid => "grid",
+            Self::Regions => "regions",
         }
     }
 }

@@ -20,6 +20,7 @@ pub mod keys;
 pub mod limits;
 pub mod merge;
 pub mod record;
+pub mod regions;
 pub mod selector;
 pub mod sequence;
 pub mod stream;

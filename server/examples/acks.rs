@@ -1,4 +1,4 @@
-//! How long a robot waits until what it sent is on disk, and a planner for an answer: a server, a robot at 40 Hz and a
+//! How long a robot waits until what it sent is on disk, and a planner for an answer, from the map and without: a server, a robot at 40 Hz and a
 //! planner in one process, over loopback, for `SECONDS` (10).
 //!
 //! `cargo run --release -p toponym-server --example acks -- [SECONDS] [DATA_FOLDER]`
@@ -6,7 +6,7 @@
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 use toponym::{Guide, Planner, Robot, RobotConfig};
-use toponym_proto::Clock;
+use toponym_proto::{Clock, Keys};
 use toponym_server::config::ServerConfig;
 use toponym_server::serve::Server;
 use toponym_sim::hall::message;
@@ -33,7 +33,8 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut robot = Robot::connect(&session, config).await?;
     let planner = Planner::new(&session, "default", "main", Duration::from_secs(10))?;
     let guide = Guide::connect(&session, "default", Some("r1")).await?;
-    let (mut acks, mut answers) = (Vec::new(), Vec::new());
+    let time = Keys::new("default")?.time();
+    let (mut acks, mut answers, mut floor) = (Vec::new(), Vec::new(), Vec::new());
     let began = Instant::now();
     for n in 0.. {
         let sent = Instant::now();
@@ -52,10 +53,18 @@ async fn main() -> Result<(), Box<dyn std::error::Error>> {
             planner.where_is("gym").await?;
             answers.push(asked.elapsed());
         }
+        // What needs no map.
+        if n > 40 && n % 4 == 3 {
+            let asked = Instant::now();
+            let reply = session.get(&time).await.map_err(|e| e.to_string())?;
+            reply.recv_async().await.map_err(|e| e.to_string())?;
+            floor.push(asked.elapsed());
+        }
         tokio::time::sleep((sent + PERIOD).saturating_duration_since(Instant::now())).await;
     }
     tell("acknowledged", &mut acks);
-    tell("answered", &mut answers);
+    tell("answered where", &mut answers);
+    tell("answered the time", &mut floor);
     server.stop().await?;
     if given.is_none() {
         std::fs::remove_dir_all(data)?;

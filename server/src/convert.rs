@@ -3,16 +3,19 @@
 //! range means.
 
 use nalgebra::Matrix3;
+use std::collections::BTreeMap;
 use toponym_core::answers::query::{self, GraphAnswer, WhereAnswer};
 use toponym_core::edge::EdgeKind;
 use toponym_core::effects::{self, TrackState};
 use toponym_core::event::{self, Event};
-use toponym_core::{Pose2, geometry};
+use toponym_core::regions::{self, Shape};
+use toponym_core::{Pose2, Snapshot, geometry};
 use toponym_proto::answer::{
     ANSWER_VERSION, Candidate, Difference, Edge, FromRobot, Goal, GraphReply, GridReply, Grounded, Heard,
     HeardStatus, LabelEntry, LabelsReply, MapIdentity, Particle, Place, PoseState, Reachable, Resolved,
     WhereReply,
 };
+use toponym_proto::regions::{Doorway, Region, RegionName, RegionsReply};
 use toponym_proto::{Mend, Message, Pose, Stamp};
 
 /// A message as the core takes it. A sentence without `began` counts as said at the clock's zero:
@@ -223,6 +226,51 @@ pub fn grid_reply(grid: query::Grid, map: MapIdentity) -> GridReply {
         map_from_grid: pose(&grid.map_from_grid),
         cells: grid.cells,
     }
+}
+
+/// Answer of `ask/regions`, coordinates to the millimetre.
+pub fn regions_reply(snapshot: &Snapshot, map: MapIdentity) -> RegionsReply {
+    let (regions, places) = (snapshot.regions(), snapshot.graph().places);
+    let millimetres = |m: f64| (m * 1000.0).round() / 1000.0;
+    let line = |line: &[(f64, f64)]| line.iter().map(|p| [millimetres(p.0), millimetres(p.1)]).collect();
+    let names = |vertices: &[u32]| {
+        let mut names: BTreeMap<&str, f64> = BTreeMap::new();
+        for (name, p) in vertices.iter().flat_map(|&v| &places[v as usize].labels) {
+            let most = names.entry(name).or_insert(0.0);
+            *most = most.max(*p);
+        }
+        let mut names: Vec<RegionName> =
+            names.into_iter().map(|(name, p)| RegionName { label: name.to_owned(), p }).collect();
+        names.sort_by(|a, b| b.p.total_cmp(&a.p).then_with(|| a.label.cmp(&b.label)));
+        names
+    };
+    let entry = |r: &regions::Region| Region {
+        id: r.id,
+        kind: match r.shape {
+            Shape::Corridor => "corridor",
+            Shape::Room => "room",
+            Shape::Hall => "hall",
+        }
+        .into(),
+        names: names(&r.places),
+        area_m2: millimetres(r.area_m2),
+        polygon_m: line(&r.polygon_m),
+        holes_m: r.holes_m.iter().map(|hole| line(hole)).collect(),
+        doorways: r
+            .doorways
+            .iter()
+            .map(|d| Doorway {
+                to: regions[d.to].id,
+                x_m: millimetres(d.at_m.0),
+                y_m: millimetres(d.at_m.1),
+                width_m: millimetres(d.width_m),
+            })
+            .collect(),
+        places: r.places.iter().map(|&v| places[v as usize].id).collect(),
+    };
+    let mut all: Vec<Region> = regions.iter().map(entry).collect();
+    all.sort_by_key(|r| r.id);
+    RegionsReply { v: ANSWER_VERSION, query: "regions".into(), map, regions: all }
 }
 
 #[cfg(test)]

@@ -6,6 +6,7 @@ use toponym_proto::answer::{
     Clocks, ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, WhereReply,
 };
 use toponym_proto::keys::Ask;
+use toponym_proto::regions::RegionsReply;
 use toponym_proto::{Header, Message};
 use toponym_server::convert;
 
@@ -49,6 +50,11 @@ async fn a_map_answers() {
     let json = site.ask(&ask(Ask::Labels, ""), "").await.unwrap();
     let labels: LabelsReply = serde_json::from_value(json).unwrap();
     assert_eq!(labels.labels[0].label, "gym");
+    let json = site.ask(&ask(Ask::Regions, ""), "").await.unwrap();
+    let rooms: RegionsReply = serde_json::from_value(json).unwrap();
+    // The hall of 12 m by 6 m is one room, and the gym is in it.
+    assert_eq!(rooms.regions.len(), 1, "{rooms:?}");
+    assert!((50.0..75.0).contains(&rooms.regions[0].area_m2) && rooms.regions[0].names[0].label == "gym");
     let json = site.ask(&ask(Ask::Grid, "resolution_m=0.2"), "").await.unwrap();
     let grid: GridReply = serde_json::from_value(json).unwrap();
     assert!(grid.cells.len() == grid.width * grid.height && grid.cells.contains(&0), "{grid:?}");
@@ -92,7 +98,7 @@ async fn who_is_lost_is_asked_where_things_are_but_not_how_far() {
     assert_eq!(json["candidates"][0]["from_robot"], serde_json::Value::Null);
     let reply: WhereReply = serde_json::from_value(json).unwrap();
     assert!(reply.candidates[0].x_m > 1.0 && reply.candidates[0].goal.is_some(), "{reply:?}");
-    for other in [Ask::Graph, Ask::Labels, Ask::Grid] {
+    for other in [Ask::Graph, Ask::Labels, Ask::Grid, Ask::Regions] {
         site.ask(&site.keys.ask("main", other), "").await.unwrap();
     }
     site.stop().await;

@@ -6,7 +6,6 @@ mod history;
 pub mod image;
 mod play;
 mod progress;
-mod regions;
 mod report;
 mod shades;
 mod summary;
@@ -18,6 +17,7 @@ pub use canvas::Canvas;
 pub use report::build;
 
 use crate::config::words_of;
+use crate::convert::regions_reply;
 use crate::fold::saved_map;
 use anyhow::{Context, Result, anyhow, bail};
 use history::History;
@@ -32,6 +32,7 @@ use toponym::log::{self, Narration, Notes, Records};
 use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
 use toponym_core::{Answer, Event, Mapper, Pose2, Query};
 use toponym_journal::Checkpoint;
+use toponym_proto::answer::MapIdentity;
 
 /// Runs `map`.
 pub fn run(args: &MapArgs) -> Result<()> {
@@ -146,8 +147,8 @@ impl Finished {
             std::fs::write(file, bytes).with_context(|| format!("--save-map {}", file.display()))?;
         }
         if let Some(file) = &args.regions {
-            let regions = regions::entries(&self.played.mapper.snapshot());
-            write_json(&regions, file).with_context(|| format!("--regions {}", file.display()))?;
+            let reply = regions_reply(&self.played.mapper.snapshot(), MapIdentity::default());
+            write_json(&reply.regions, file).with_context(|| format!("--regions {}", file.display()))?;
         }
         if let Some(file) = &args.image {
             draw(&self.played.mapper, &self.trajectory, file)

@@ -63,6 +63,7 @@ mod tests {
     fn region(corners: [(f64, f64); 2], to: usize) -> Region {
         let [(x0, y0), (x1, y1)] = corners;
         Region {
+            id: 0,
             places: vec![0],
             polygon_m: vec![(x0, y0), (x1, y0), (x1, y1), (x0, y1)],
             holes_m: vec![vec![(x0 + 1.0, y0 + 1.0), (x0 + 1.0, y0 + 2.0), (x0 + 2.0, y0 + 1.0)]],

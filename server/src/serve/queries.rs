@@ -59,7 +59,7 @@ impl Permits {
     /// of its kind. Holds until it is dropped.
     pub fn take(&self, key: &str) -> Option<OwnedSemaphorePermit> {
         // A wildcard may select a grid.
-        let kind = if key.contains('*') || key.ends_with("/ask/grid") {
+        let kind = if key.contains('*') || key.ends_with("/ask/grid") || key.ends_with("/ask/regions") {
             &self.heavy
         } else if key.contains("/do/") {
             &self.commands
@@ -88,7 +88,7 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
             let map = map(board, id)?;
             match Ask::ALL.into_iter().find(|ask| ask.as_str() == *what) {
                 Some(ask) => answer_about(&map, ask, arguments),
-                None => Err(no_such_query(key).hint("ask one of where, labels, graph, grid")),
+                None => Err(no_such_query(key).hint("ask one of where, labels, graph, grid, regions")),
             }
         }
         ["map", id, "out", "graph"] => {
@@ -143,6 +143,7 @@ fn json<T: Serialize>(value: &T) -> Result<Vec<u8>, Problem> {
 
 fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>, Problem> {
     let snapshot = map.snapshot.load_full();
+    let identity = map.identity(&snapshot);
     let query = match ask {
         Ask::Where => {
             let [name, text, lang, robot] = take(arguments, ["name", "text", "lang", "robot"])?;
@@ -155,12 +156,15 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
             let [] = take(arguments, [])?;
             if ask == Ask::Labels { Query::Labels } else { Query::Graph }
         }
+        Ask::Regions => {
+            let [] = take(arguments, [])?;
+            return json(&convert::regions_reply(&snapshot, identity));
+        }
         Ask::Grid => {
             let [resolution] = take(arguments, ["resolution_m"])?;
             Query::Grid { resolution_m: resolution.map_or(Ok(RESOLUTION_DEFAULT_M), |r| resolution_m(&r))? }
         }
     };
-    let identity = map.identity(&snapshot);
     match (ask, snapshot.answer(&query)) {
         (Ask::Where, Answer::Where(a)) => json(&convert::where_reply(a, identity, map.stamp(), &map.robot)),
         (Ask::Labels, Answer::Labels(a)) => json(&convert::labels_reply(a, identity)),

@@ -6,7 +6,10 @@ use std::io::Write as _;
 use std::time::Duration;
 use toponym::{Connection, Planner};
 use toponym_proto::answer::{Candidate, LabelsReply, WhereReply};
+use toponym_proto::regions::{Region, RegionsReply};
 
+/// Less likely names of rooms are not told in text.
+const CALLED_MIN: f64 = 0.3;
 /// Less likely alternatives are left out of the text (not of the JSON).
 const SHOWN_MIN: f64 = 0.005;
 
@@ -44,7 +47,7 @@ struct AskedArgs {
     timeout: Duration,
 }
 
-/// Arguments of `labels`.
+/// Arguments of `labels` and of `rooms`.
 #[derive(Debug, clap::Args)]
 #[command(after_help = "\
 Example:
@@ -68,6 +71,14 @@ pub async fn labels(to: &Connection, site: &str, args: &LabelsArgs) -> Result<u8
     let reply = planner.labels().await?;
     print(&if args.asked.json { json(&reply)? } else { labels_text(&reply) })?;
     Ok(if reply.labels.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
+}
+
+pub async fn rooms(to: &Connection, site: &str, args: &LabelsArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
+    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
+    let reply = planner.regions().await?;
+    print(&if args.asked.json { json(&reply)? } else { rooms_text(&reply) })?;
+    Ok(if reply.regions.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 
 fn json<T: serde::Serialize>(value: &T) -> Result<String, Failure> {
@@ -135,9 +146,52 @@ fn labels_text(reply: &LabelsReply) -> String {
     text
 }
 
+fn rooms_text(reply: &RegionsReply) -> String {
+    if reply.regions.is_empty() {
+        return format!("map {} has no rooms yet\n", reply.map.id);
+    }
+    let called = |r: &Region| {
+        let likely = r.names.iter().filter(|n| n.p >= CALLED_MIN);
+        let names: Vec<String> = likely.map(|n| format!("{} ({:.2})", n.label, n.p)).collect();
+        if names.is_empty() { "no name".to_owned() } else { names.join(", ") }
+    };
+    let mut text = String::new();
+    for r in &reply.regions {
+        let to: Vec<String> = r.doorways.iter().map(|d| d.to.to_string()).collect();
+        let to = if to.is_empty() { String::new() } else { format!(", leads to {}", to.join(", ")) };
+        let _ = writeln!(text, "{:<5} {:<8} {:6.1} m²  {}{to}", r.id, r.kind, r.area_m2, called(r));
+    }
+    text
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toponym_proto::regions::{Doorway, RegionName};
+
+    #[test]
+    fn rooms_are_told_by_what_they_are_called_and_where_they_lead() {
+        let name = |label: &str, p| RegionName { label: label.into(), p };
+        let room = |id, names, to| Region {
+            id,
+            kind: "room".into(),
+            names,
+            area_m2: 20.04,
+            polygon_m: vec![],
+            holes_m: vec![],
+            doorways: vec![Doorway { to, x_m: 0.0, y_m: 0.0, width_m: 0.9 }],
+            places: vec![id],
+        };
+        let regions = vec![room(0, vec![name("gym", 0.9), name("lab", 0.1)], 7), room(7, vec![], 0)];
+        let reply = RegionsReply { v: 1, query: "regions".into(), map: MapIdentity::default(), regions };
+        let text = rooms_text(&reply);
+        let rows = [
+            "0     room       20.0 m²  gym (0.90), leads to 7",
+            "7     room       20.0 m²  no name, leads to 0",
+        ];
+        assert_eq!(text.lines().collect::<Vec<_>>(), rows);
+    }
+
     use toponym_proto::answer::{FromRobot, LabelEntry, MapIdentity, Resolved};
 
     fn candidate(probability: f64, bearing_rad: Option<f64>) -> Candidate {

@@ -45,6 +45,7 @@ Try, with `toponym-server serve` running in another terminal:
   toponym replay tour/sim.clf --narration tour/narration.jsonl --speed 20
   toponym labels                                 what was it told?
   toponym where kitchen                          how far, which way, how sure?
+  toponym rooms                                  how large, what called, where do they lead?
   toponym say 'this is the workshop'             teach it another name
 
 Exit codes: 0 found, 1 not known, 2 usage, 3 no server, 4 timeout, 5 refused."
@@ -107,6 +108,8 @@ enum Command {
     Where(find::WhereArgs),
     /// List all names taught so far.
     Labels(find::LabelsArgs),
+    /// List the rooms: how large, what they are called, where they lead.
+    Rooms(find::LabelsArgs),
     /// Take a sentence back.
     Undo(mend::UndoArgs),
     /// Give a misheard name its right spelling.
@@ -175,6 +178,7 @@ async fn done(args: &Args) -> Result<u8, Failure> {
         Command::Say(say) => talk::say(&to, &args.site, say).await,
         Command::Where(asked) => find::find(&to, &args.site, asked).await,
         Command::Labels(asked) => find::labels(&to, &args.site, asked).await,
+        Command::Rooms(asked) => find::rooms(&to, &args.site, asked).await,
         Command::Undo(undo) => mend::undo(&to, &args.site, undo).await,
         Command::Rename(rename) => mend::rename(&to, &args.site, rename).await,
         Command::Forget(forget) => mend::forget(&to, &args.site, forget).await,

@@ -16,7 +16,7 @@ mod raster;
 #[cfg(test)]
 mod tests;
 
-use crate::edge::Vertex;
+use crate::edge::{PlaceId, Vertex};
 use crate::geometry::Pose2;
 use crate::graph::Place;
 use std::sync::Arc;
@@ -24,6 +24,8 @@ use std::sync::Arc;
 /// A part of the map.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Region {
+    /// The id of its oldest place: of two that become one the lower stays.
+    pub id: PlaceId,
     /// Places in it, oldest first; at least one.
     pub places: Vec<Vertex>,
     /// Its outline in the map, metres, counter-clockwise.
@@ -99,6 +101,7 @@ pub fn regions(places: &[(Pose2, Arc<Place>)]) -> Vec<Region> {
             });
             let area_m2 = cells.len() as f64 * raster.resolution_m.powi(2);
             Region {
+                id: places[within[part][0] as usize].1.id,
                 places: std::mem::take(&mut within[part]),
                 polygon_m: outline.polygon_m,
                 holes_m: outline.holes_m,
