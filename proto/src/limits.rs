@@ -122,6 +122,9 @@ pub const EMPTY_IDLE_S: u64 = 300;
 pub const SEQ_MAX: u64 = 1 << 46;
 /// Times stay within this of the clock's zero, so that the difference of two is never too large.
 pub const STAMP_MAX_NS: i64 = 4_000_000_000_000_000_000;
+/// A sentence that began so long before or after all of its robot's stream, or of its log, is on another clock. A stream that
+/// is played fast may be minutes behind its sentences.
+pub const SAID_OUTSIDE_S: f64 = 900.0;
 /// A sentence said longer ago than this is history.
 pub const AGO_MAX_S: f64 = 7.0 * 86_400.0;
 /// Coordinates stay within this of the origin: an odometry frame that is further off is broken.

@@ -180,10 +180,11 @@ fn way(c: &Candidate) -> String {
 async fn picture(planner: &Planner, file: &Path) -> Result<()> {
     let graph = graph(planner.graph().await?);
     let grid = grid(planner.grid(0.05).await?);
+    let rooms = planner.regions().await?.regions;
     let track: Vec<Pose2> = graph.places.iter().map(|p| p.pose).collect();
     let out = File::create(file).with_context(|| format!("--image {}", file.display()))?;
     let mut out = BufWriter::new(out);
-    image::draw(&grid, &graph, &track, &[]).write_png(&mut out)?;
+    image::draw(&grid, &graph, &track, &rooms).write_png(&mut out)?;
     Ok(out.flush()?)
 }
 

@@ -13,12 +13,10 @@ use super::{LogRecord, Notes, Records};
 use serde::Deserialize;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
+use toponym_proto::limits::SAID_OUTSIDE_S;
 use toponym_proto::merge::{Sentences, order_stamp};
 use toponym_proto::stream::Hearing;
 use toponym_proto::{Limits, Message, Say, Stamp};
-
-/// A sentence that began so long before or after the log is on another clock.
-const OUTSIDE_S: f64 = 900.0;
 
 /// Why a narration can't be used. Unlike a log's a bad line is an error: a person wrote it and
 /// can mend it, and the map would silently lack a name.
@@ -179,8 +177,10 @@ pub fn merged(mut log: Box<dyn Records>, narration: &Narration) -> Box<dyn Recor
     let header = next.as_ref().and_then(|r| r.message.header());
     let (robot, first) = header.map_or((String::new(), Stamp::default()), |h| (h.robot.clone(), h.stamp));
     let mut says = Sentences::default();
-    let (before, rest): (Vec<Say>, Vec<Say>) =
-        narration.says(&robot, first).into_iter().partition(|say| began_s(say) < first.seconds() - OUTSIDE_S);
+    let (before, rest): (Vec<Say>, Vec<Say>) = narration
+        .says(&robot, first)
+        .into_iter()
+        .partition(|say| began_s(say) < first.seconds() - SAID_OUTSIDE_S);
     for say in rest {
         says.push(say, first);
     }
@@ -209,7 +209,7 @@ impl Merged {
     fn left(&mut self) -> Option<Say> {
         loop {
             let say = self.says.pop()?;
-            if began_s(&say) <= self.newest.seconds() + OUTSIDE_S {
+            if began_s(&say) <= self.newest.seconds() + SAID_OUTSIDE_S {
                 return Some(say);
             }
             self.outside.push(say);

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use toponym_core::Pose2;
 use toponym_core::answers::query::{EdgeView, GraphAnswer, Grid, PlaceView};
 use toponym_core::edge::{EdgeKind, PlaceId};
-use toponym_core::regions::Region;
+use toponym_proto::regions::Region;
 
 /// Longest side of the map's part of the picture, pixels.
 const SIDE_MAX: usize = 1800;

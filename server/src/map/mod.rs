@@ -191,7 +191,8 @@ fn draw(mapper: &Mapper, trajectory: &[Pose2], file: &Path) -> Result<()> {
     let query = Query::Grid { resolution_m: image::resolution_m(extent_m) };
     let Answer::Grid(grid) = snapshot.answer(&query) else { bail!("the map has no grid to draw") };
     let mut out = BufWriter::new(File::create(file)?);
-    image::draw(&grid, &graph, trajectory, &snapshot.regions()).write_png(&mut out)?;
+    let regions = regions_reply(&snapshot, MapIdentity::default()).regions;
+    image::draw(&grid, &graph, trajectory, &regions).write_png(&mut out)?;
     Ok(out.flush()?)
 }
 

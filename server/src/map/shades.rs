@@ -1,8 +1,9 @@
 //! Soft colours of rooms, for the picture.
 
 use embedded_graphics::pixelcolor::Rgb888;
+use std::collections::BTreeMap;
 use toponym_core::answers::query::Grid;
-use toponym_core::regions::Region;
+use toponym_proto::regions::Region;
 
 /// Colours that letters and lines are legible on; neighbours have different ones as far as they go.
 const SHADES: [Rgb888; 8] = [
@@ -19,11 +20,11 @@ const SHADES: [Rgb888; 8] = [
 /// The shade of each cell of a grid that lies in a region.
 pub fn shades(grid: &Grid, regions: &[Region]) -> Vec<Option<Rgb888>> {
     let mut cells = vec![None; grid.cells.len()];
-    let mut own: Vec<usize> = Vec::new();
+    let mut own: BTreeMap<u64, usize> = BTreeMap::new();
     for (k, region) in regions.iter().enumerate() {
-        let near = |shade: &usize| region.doorways.iter().any(|d| own.get(d.to) == Some(shade));
+        let near = |shade: &usize| region.doorways.iter().any(|d| own.get(&d.to) == Some(shade));
         let shade = (0..SHADES.len()).find(|shade| !near(shade)).unwrap_or(k % SHADES.len());
-        own.push(shade);
+        own.insert(region.id, shade);
         fill(grid, region, SHADES[shade], &mut cells);
     }
     cells
@@ -32,9 +33,9 @@ pub fn shades(grid: &Grid, regions: &[Region]) -> Vec<Option<Rgb888>> {
 /// Row by row, between every other crossing of its outlines.
 fn fill(grid: &Grid, region: &Region, shade: Rgb888, cells: &mut [Option<Rgb888>]) {
     let grid_from_map = grid.map_from_grid.inverse();
-    let to_cells = |line: &Vec<(f64, f64)>| -> Vec<(f64, f64)> {
-        let to_cell = |p: &(f64, f64)| {
-            let (x, y) = grid_from_map.apply(p.0, p.1);
+    let to_cells = |line: &Vec<[f64; 2]>| -> Vec<(f64, f64)> {
+        let to_cell = |p: &[f64; 2]| {
+            let (x, y) = grid_from_map.apply(p[0], p[1]);
             (x / grid.resolution_m, y / grid.resolution_m)
         };
         line.iter().map(to_cell).collect()
@@ -58,18 +59,19 @@ fn fill(grid: &Grid, region: &Region, shade: Rgb888, cells: &mut [Option<Rgb888>
 mod tests {
     use super::*;
     use toponym_core::Pose2;
-    use toponym_core::regions::{Doorway, Shape};
+    use toponym_proto::regions::Doorway;
 
-    fn region(corners: [(f64, f64); 2], to: usize) -> Region {
+    fn region(id: u64, corners: [(f64, f64); 2], to: u64) -> Region {
         let [(x0, y0), (x1, y1)] = corners;
         Region {
-            id: 0,
-            places: vec![0],
-            polygon_m: vec![(x0, y0), (x1, y0), (x1, y1), (x0, y1)],
-            holes_m: vec![vec![(x0 + 1.0, y0 + 1.0), (x0 + 1.0, y0 + 2.0), (x0 + 2.0, y0 + 1.0)]],
+            id,
+            kind: "room".into(),
+            names: vec![],
             area_m2: 1.0,
-            doorways: vec![Doorway { to, at_m: (x1, y0), width_m: 1.0 }],
-            shape: Shape::Room,
+            polygon_m: vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1]],
+            holes_m: vec![vec![[x0 + 1.0, y0 + 1.0], [x0 + 1.0, y0 + 2.0], [x0 + 2.0, y0 + 1.0]]],
+            doorways: vec![Doorway { to, x_m: x1, y_m: y0, width_m: 1.0 }],
+            places: vec![id],
         }
     }
 
@@ -82,7 +84,7 @@ mod tests {
             map_from_grid: Pose2::new(-1.0, -1.0, 0.0),
             cells: vec![0; 200],
         };
-        let regions = [region([(0.0, 0.0), (4.0, 3.0)], 1), region([(4.0, 0.0), (8.0, 3.0)], 0)];
+        let regions = [region(5, [(0.0, 0.0), (4.0, 3.0)], 9), region(9, [(4.0, 0.0), (8.0, 3.0)], 5)];
         let shades = shades(&grid, &regions);
         let count = |shade: usize| shades.iter().filter(|s| **s == Some(SHADES[shade])).count();
         // 8 by 6 cells without the triangle of 2 by 2.

@@ -8,10 +8,8 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 use toponym_proto::Stamp;
 use toponym_proto::answer::{ErrorCode, Problem};
+use toponym_proto::limits::SAID_OUTSIDE_S;
 
-/// A sentence that began so long before or after all that has arrived of its robot is on another clock. A stream that is
-/// played fast may be minutes behind its sentences.
-const CLOCK_MAX_S: f64 = 900.0;
 /// Stamps are noted no closer than this, and so many.
 const NOTED: Duration = Duration::from_secs(1);
 const NOTED_MAX: usize = 900;
@@ -70,7 +68,7 @@ impl RobotClock {
         let until = self.noted.partition_point(|(at, _)| at.as_secs_f64() <= then_s);
         if let Some((at, stamp)) = until.checked_sub(1).and_then(|k| self.noted.get(k)) {
             // What the robot sent then may still be on its way: no reason to put it where the robot was before.
-            return Ok(later(*stamp, then_s - at.as_secs_f64()).min(later(newest, CLOCK_MAX_S)));
+            return Ok(later(*stamp, then_s - at.as_secs_f64()).min(later(newest, SAID_OUTSIDE_S)));
         }
         let not_known =
             || Problem::new(ErrorCode::Busy, "the robot's clock is not known yet: say it again later");
@@ -104,7 +102,7 @@ impl RobotClock {
         let before_s = self.first.map_or(0.0, |first| off_s(began, first));
         let (s, what) =
             if ahead_s > before_s { (ahead_s, "after the newest") } else { (before_s, "before the first") };
-        if s <= CLOCK_MAX_S {
+        if s <= SAID_OUTSIDE_S {
             return Ok(());
         }
         let message = format!("began is {s:.0} s {what} stamp of the robot: it is on another clock");
@@ -162,7 +160,7 @@ mod tests {
     fn of_a_robot_that_is_silent_no_time_far_ahead_is_reckoned() {
         let mut clock = RobotClock::default();
         hear(&mut clock, 0.0, 10.0, 1.0);
-        assert!(off_s(clock.before(s(5000.0), 1.0).unwrap(), 1009.9 + CLOCK_MAX_S) < 0.01);
+        assert!(off_s(clock.before(s(5000.0), 1.0).unwrap(), 1009.9 + SAID_OUTSIDE_S) < 0.01);
     }
 
     #[test]
