@@ -5,9 +5,9 @@ use super::raster::Raster;
 use std::collections::BTreeMap;
 
 /// Two parts are one where the saddle has so much of the clearance of the narrower, …
-const OF_NARROWER: f32 = 0.75;
+const OF_NARROWER: f32 = 0.7;
 /// … and so much of that of the wider: a corridor that opens into a hall ends there.
-const OF_WIDER: f32 = 0.45;
+const OF_WIDER: f32 = 0.55;
 /// Smaller parts, niches and doorways, belong to the neighbour with which they share the widest saddle.
 const LEAST_M2: f64 = 1.5;
 
