@@ -7,6 +7,10 @@ use crate::edge::{PlaceId, Vertex};
 use crate::filter::labels::LabelId;
 use crate::geometry::Pose2;
 use nalgebra::Matrix3;
+use std::collections::BTreeSet;
+
+/// Sentences told as reasons, the newest: of a name that was said a thousand times they would be the most of an answer.
+const BECAUSE_MAX: usize = 32;
 
 impl Snapshot {
     pub(super) fn candidate(&self, label: LabelId, Region { place, p_is, probability }: Region) -> Candidate {
@@ -43,17 +47,17 @@ impl Snapshot {
     }
 
     fn because(&self, label: LabelId, v: Vertex) -> Vec<String> {
-        let mut ids: Vec<String> = Vec::new();
-        for e in self.particles[0].labels.evidence() {
-            let near = self.poses[e.place as usize].distance_m(&self.poses[v as usize]) < SAME_REGION_M;
-            if e.label == label && near {
-                let id = self.ledger.entries().get(e.utterance as usize).map_or("", |u| &u.id);
-                if !ids.iter().any(|known| known == id) {
-                    ids.push(id.to_owned());
-                }
+        let at = self.poses[v as usize];
+        let mut utterances: BTreeSet<u32> = BTreeSet::new();
+        for e in self.particles[0].labels.evidence().iter().filter(|e| e.label == label) {
+            if self.poses[e.place as usize].distance_m(&at) < SAME_REGION_M {
+                utterances.insert(e.utterance);
             }
         }
-        ids
+        let newest = utterances.len().saturating_sub(BECAUSE_MAX);
+        let ids = utterances.into_iter().skip(newest);
+        ids.map(|u| self.ledger.entries().get(u as usize).map_or_else(String::new, |e| e.id.clone()))
+            .collect()
     }
 }
 
