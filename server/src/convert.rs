@@ -230,7 +230,7 @@ pub fn grid_reply(grid: query::Grid, map: MapIdentity) -> GridReply {
 
 /// Answer of `ask/regions`, coordinates to the millimetre.
 pub fn regions_reply(snapshot: &Snapshot, map: MapIdentity) -> RegionsReply {
-    let (regions, places) = (snapshot.regions(), snapshot.graph().places);
+    let (regions, places) = (snapshot.regions(), snapshot.places());
     let millimetres = |m: f64| (m * 1000.0).round() / 1000.0;
     let line = |line: &[(f64, f64)]| line.iter().map(|p| [millimetres(p.0), millimetres(p.1)]).collect();
     let names = |vertices: &[u32]| {

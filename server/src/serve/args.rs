@@ -122,12 +122,15 @@ fn renew_on_hangup(board: Arc<Board>, config: ServerConfig) -> std::io::Result<t
     let mut hangup = signal(SignalKind::hangup())?;
     Ok(tokio::spawn(async move {
         while hangup.recv().await.is_some() {
-            match config.words() {
-                Ok(words) => board.learn(words),
-                Err(e) => error!("words stay as they are: {e}"),
-            }
-            let board = board.clone();
-            let saved = tokio::task::spawn_blocking(move || save_all(&board)).await;
+            let (board, config) = (board.clone(), config.clone());
+            let renew = move || {
+                match config.words() {
+                    Ok(words) => board.learn(words),
+                    Err(e) => error!("words stay as they are: {e}"),
+                }
+                save_all(&board)
+            };
+            let saved = tokio::task::spawn_blocking(renew).await;
             match saved {
                 Ok(Ok(maps)) => info!(maps = maps.join(" "), "saved"),
                 Ok(Err(problem)) => error!("not saved: {problem}"),

@@ -182,15 +182,17 @@ impl Board {
     }
 
     /// From now on the site's own words are these; every map takes them in as something that it hears.
+    /// Waits for room on the ways to them.
     pub fn learn(&self, words: String) {
-        if **self.words.load() == words {
+        let words = Arc::new(words);
+        // First, for a map that begins meanwhile.
+        if self.words.swap(words.clone()) == words {
             return;
         }
         for map in self.maps.load().values() {
             // One whose journal has ended learns them at its next start.
-            let _ = map.work.send(Work::Take(Event::Glossary(words.clone())));
+            let _ = map.work.send(Work::Take(Event::Glossary(words.to_string())));
         }
-        self.words.store(Arc::new(words));
     }
 
     /// Shows a map no more.

@@ -33,9 +33,9 @@ pub struct WhereArgs {
     asked: AskedArgs,
 }
 
-/// What all questions take.
+/// What all questions take; all that `labels` and `rooms` do.
 #[derive(Debug, clap::Args)]
-struct AskedArgs {
+pub struct AskedArgs {
     /// Which map.
     #[arg(long, default_value = "main")]
     map: String,
@@ -47,16 +47,6 @@ struct AskedArgs {
     timeout: Duration,
 }
 
-/// Arguments of `labels` and of `rooms`.
-#[derive(Debug, clap::Args)]
-#[command(after_help = "\
-Example:
-  toponym labels --map floor2")]
-pub struct LabelsArgs {
-    #[command(flatten)]
-    asked: AskedArgs,
-}
-
 pub async fn find(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
     let session = to.open().await?;
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
@@ -65,19 +55,19 @@ pub async fn find(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, F
     Ok(if reply.candidates.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 
-pub async fn labels(to: &Connection, site: &str, args: &LabelsArgs) -> Result<u8, Failure> {
+pub async fn labels(to: &Connection, site: &str, asked: &AskedArgs) -> Result<u8, Failure> {
     let session = to.open().await?;
-    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
+    let planner = Planner::new(&session, site, &asked.map, asked.timeout)?;
     let reply = planner.labels().await?;
-    print(&if args.asked.json { json(&reply)? } else { labels_text(&reply) })?;
+    print(&if asked.json { json(&reply)? } else { labels_text(&reply) })?;
     Ok(if reply.labels.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 
-pub async fn rooms(to: &Connection, site: &str, args: &LabelsArgs) -> Result<u8, Failure> {
+pub async fn rooms(to: &Connection, site: &str, asked: &AskedArgs) -> Result<u8, Failure> {
     let session = to.open().await?;
-    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
+    let planner = Planner::new(&session, site, &asked.map, asked.timeout)?;
     let reply = planner.regions().await?;
-    print(&if args.asked.json { json(&reply)? } else { rooms_text(&reply) })?;
+    print(&if asked.json { json(&reply)? } else { rooms_text(&reply) })?;
     Ok(if reply.regions.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 
@@ -167,6 +157,7 @@ fn rooms_text(reply: &RegionsReply) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use toponym_proto::answer::{FromRobot, LabelEntry, MapIdentity, Resolved};
     use toponym_proto::regions::{Doorway, RegionName};
 
     #[test]
@@ -191,8 +182,6 @@ mod tests {
         ];
         assert_eq!(text.lines().collect::<Vec<_>>(), rows);
     }
-
-    use toponym_proto::answer::{FromRobot, LabelEntry, MapIdentity, Resolved};
 
     fn candidate(probability: f64, bearing_rad: Option<f64>) -> Candidate {
         Candidate {

@@ -107,9 +107,9 @@ enum Command {
     /// Ask where a place is.
     Where(find::WhereArgs),
     /// List all names taught so far.
-    Labels(find::LabelsArgs),
+    Labels(find::AskedArgs),
     /// List the rooms: how large, what they are called, where they lead.
-    Rooms(find::LabelsArgs),
+    Rooms(find::AskedArgs),
     /// Take a sentence back.
     Undo(mend::UndoArgs),
     /// Give a misheard name its right spelling.

@@ -122,13 +122,25 @@ impl Snapshot {
 
     /// All graphs; places as in the best.
     pub fn graph(&self) -> GraphAnswer {
+        GraphAnswer {
+            epoch: self.now.epoch,
+            rev: self.now.rev,
+            places: self.places(),
+            particles: self.particles.iter().map(|p| self.particle(p)).collect(),
+            unresolved: self.unresolved,
+            differences: self.differences(),
+            effective_sample_size: effective_sample_size(&self.particles),
+        }
+    }
+
+    /// All places, open ones too, in the best graph.
+    pub fn places(&self) -> Vec<PlaceView> {
         let ids = self
             .places
             .iter()
             .map(|p| (p.id, p.stamp_ns))
             .chain(self.open.iter().map(|o| (o.id, o.stamp_ns)));
-        let places = ids
-            .zip(&self.poses)
+        ids.zip(&self.poses)
             .enumerate()
             .map(|(v, ((id, stamp_ns), pose))| PlaceView {
                 id,
@@ -136,16 +148,7 @@ impl Snapshot {
                 pose: *pose,
                 labels: self.names_of(v as Vertex),
             })
-            .collect();
-        GraphAnswer {
-            epoch: self.now.epoch,
-            rev: self.now.rev,
-            places,
-            particles: self.particles.iter().map(|p| self.particle(p)).collect(),
-            unresolved: self.unresolved,
-            differences: self.differences(),
-            effective_sample_size: effective_sample_size(&self.particles),
-        }
+            .collect()
     }
 
     /// What the best graphs disagree about.

@@ -25,8 +25,12 @@ use std::collections::BTreeMap;
 
 /// Bytes of all lines.
 pub const GLOSSARY_BYTES_MAX: usize = 256 << 10;
-/// Ways to say one thing that a line may stand for.
+/// And of one: what it means may stand in a text a thousand times.
+const LINE_BYTES_MAX: usize = 1000;
+/// Ways to say one thing that a line may stand for, …
 const EXPANDED_MAX: usize = 512;
+/// … and all lines.
+const GLOSSES_MAX: usize = 100_000;
 /// Words that `*` stands for at most.
 const ANY_MAX: usize = 5;
 /// A word is longer than its known end by so many letters.
@@ -100,12 +104,17 @@ impl Glossary {
         if text.len() > GLOSSARY_BYTES_MAX {
             return Err(GlossaryError { line: 0, what: "more than 256 KiB" });
         }
-        let mut all = Self { text: text.to_owned(), ..Self::default() };
+        let (mut all, mut ways) = (Self { text: text.to_owned(), ..Self::default() }, 0);
         for (k, line) in text.lines().enumerate() {
             let line = line.split('#').next().unwrap_or_default().trim();
             let is_bad = |what| GlossaryError { line: k + 1, what };
             if line.is_empty() {
                 continue;
+            }
+            if line.len() > LINE_BYTES_MAX || ways > GLOSSES_MAX {
+                return Err(is_bad(
+                    "longer than 1000 bytes, or all lines stand for more than 100 000 ways to say things",
+                ));
             }
             if let Some(names) = line.strip_prefix("name:") {
                 for name in names.split(';').map(str::trim).filter(|name| !name.is_empty()) {
@@ -115,7 +124,7 @@ impl Glossary {
             }
             let (said, meant) =
                 line.split_once('=').ok_or_else(|| is_bad("neither \"name: …\" nor \"words = words\""))?;
-            all.gloss(said.trim(), meant.trim()).map_err(is_bad)?;
+            ways += all.gloss(said.trim(), meant.trim()).map_err(is_bad)?;
         }
         for glosses in all.glosses.values_mut() {
             glosses.sort_by_key(|g| std::cmp::Reverse(g.said.len()));
@@ -144,7 +153,8 @@ impl Glossary {
         Some(())
     }
 
-    fn gloss(&mut self, said: &str, meant: &str) -> Result<(), &'static str> {
+    /// Takes a line in; tells how many ways to say it there are.
+    fn gloss(&mut self, said: &str, meant: &str) -> Result<usize, &'static str> {
         let words = |text: &str| text.split_whitespace().map(str::to_lowercase).collect::<Vec<_>>();
         let meant = words(meant);
         if let Some(end) = said.strip_prefix('-') {
@@ -152,7 +162,7 @@ impl Glossary {
                 return Err("an end of a word is letters");
             }
             self.ends.push((end.to_lowercase(), meant));
-            return Ok(());
+            return Ok(1);
         }
         let choices = |word: &str| word.split('|').count() + usize::from(word.starts_with('('));
         if said
@@ -166,7 +176,9 @@ impl Glossary {
         if said.split_whitespace().any(|w| w.starts_with('(') != w.ends_with(')')) {
             return Err("what may be left out is one word");
         }
-        for mut said in expanded(&words(said).join(" ")) {
+        let all = expanded(&words(said).join(" "));
+        let ways = all.len();
+        for mut said in all {
             said.retain(|word| !word.is_empty());
             let stars = |words: &[String]| words.iter().filter(|w| *w == "*").count();
             match said.first() {
@@ -179,7 +191,7 @@ impl Glossary {
                 }
             }
         }
-        Ok(())
+        Ok(ways)
     }
 
     /// A text with other words in the place of those that it knows.
@@ -296,6 +308,9 @@ impl Glossary {
         };
         for text in told {
             for (stand_in, name) in &self.stand_ins {
+                if !text.contains(stand_in) {
+                    continue;
+                }
                 let written = name.as_str().replace(' ', "_");
                 for room in ["_room", " room", ""] {
                     *text = text.replace(&format!("{stand_in}{room}"), &written);

@@ -55,7 +55,10 @@ impl Speech {
     /// tells nothing, and goes.
     pub(super) fn english(&self, text: &str) -> String {
         let text = self.site.english(text);
-        self.language.map_or(text.clone(), |words| words.english(&text.to_lowercase()))
+        match self.language {
+            Some(words) => words.english(&text.to_lowercase()),
+            None => text,
+        }
     }
 
     fn restored(&self, mut parse: Parse) -> Parse {

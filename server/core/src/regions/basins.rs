@@ -15,24 +15,19 @@ const LEAST_M2: f64 = 1.5;
 pub struct Parts {
     /// The part of each free cell.
     pub of: Vec<Option<u32>>,
-    pub count: usize,
+    /// The cells of each, in order.
+    pub cells: Vec<Vec<usize>>,
     /// The highest clearance of each, metres.
     pub peak_m: Vec<f32>,
-    /// Where two parts meet first.
+    /// Where two parts meet, each stretch once.
     pub saddles: Vec<Saddle>,
 }
 
 /// Where two parts meet.
 pub struct Saddle {
     pub of: [u32; 2],
+    /// The one with the widest clearance.
     pub cell: usize,
-}
-
-impl Parts {
-    /// Its cells in order.
-    pub fn cells(&self, part: u32) -> Vec<usize> {
-        (0..self.of.len()).filter(|&cell| self.of[cell] == Some(part)).collect()
-    }
 }
 
 /// Parts that grow together.
@@ -132,17 +127,19 @@ fn take_up_small(raster: &Raster, clearance: &[f32], flood: &mut Flood, of: &[Op
 /// Parts numbered in the order of their first cells.
 fn numbered(raster: &Raster, clearance: &[f32], mut flood: Flood, mut of: Vec<Option<u32>>) -> Parts {
     let mut numbers: BTreeMap<u32, u32> = BTreeMap::new();
-    let mut peak_m = Vec::new();
-    for part in of.iter_mut().flatten() {
+    let (mut peak_m, mut cells) = (Vec::new(), Vec::new());
+    for (cell, part) in of.iter_mut().enumerate().filter_map(|(cell, part)| Some((cell, part.as_mut()?))) {
         let root = flood.root(*part);
         let next = numbers.len() as u32;
         *part = *numbers.entry(root).or_insert_with(|| {
             peak_m.push(flood.peak_m[root as usize]);
+            cells.push(Vec::new());
             next
         });
+        cells[*part as usize].push(cell);
     }
     let saddles = saddles(raster, clearance, &of);
-    Parts { of, count: numbers.len(), peak_m, saddles }
+    Parts { of, cells, peak_m, saddles }
 }
 
 /// Where parts meet: of each stretch of cells at which two do, the one with the widest clearance.

@@ -72,22 +72,22 @@ pub fn regions(places: &[(Pose2, Arc<Place>)]) -> Vec<Region> {
     let Some(raster) = raster::Raster::new(places) else { return Vec::new() };
     let clearance = clearance::clearance(&raster);
     let parts = basins::basins(&raster, &clearance);
-    let mut within: Vec<Vec<Vertex>> = vec![Vec::new(); parts.count];
+    let mut within: Vec<Vec<Vertex>> = vec![Vec::new(); parts.cells.len()];
     for (v, (pose, _)) in places.iter().enumerate() {
         if let Some(part) = raster.near(pose.x_m, pose.y_m, |cell| parts.of[cell]) {
             within[part as usize].push(v as Vertex);
         }
     }
     // Those that were seen through a door alone are none yet.
-    let mut index = vec![None; parts.count];
-    for (n, part) in (0..parts.count).filter(|&part| !within[part].is_empty()).enumerate() {
+    let mut index = vec![None; parts.cells.len()];
+    for (n, part) in (0..parts.cells.len()).filter(|&part| !within[part].is_empty()).enumerate() {
         index[part] = Some(n);
     }
-    (0..parts.count)
+    (0..parts.cells.len())
         .filter(|&part| index[part].is_some())
         .map(|part| {
-            let cells = parts.cells(part as u32);
-            let outline = outline::outline(&raster, &cells);
+            let cells = &parts.cells[part];
+            let outline = outline::outline(&raster, cells, &|cell| parts.of[cell] == Some(part as u32));
             let doorways = parts.saddles.iter().filter_map(|s| {
                 let to = if s.of[0] == part as u32 {
                     s.of[1]

@@ -30,8 +30,8 @@ const PASS: i16 = -2;
 const CLAMP: i16 = 60;
 /// A robot is no narrower, from its middle.
 const ROBOT_M: f64 = 0.2;
-/// Places that follow each other lie no farther apart.
-const STRIDE_MAX_M: f64 = 3.0;
+/// Between places that lie farther apart nobody knows where it drove.
+const STRIDE_MAX_M: f64 = 2.0;
 /// Room around the outermost points.
 const MARGIN_M: f64 = 1.0;
 
@@ -81,9 +81,12 @@ pub fn grid(places: &[(Pose2, Arc<Place>)], resolution_m: f64) -> Grid {
         }
     }
     // Where the robot drove nothing stands: people who walked with it leave traces there.
-    for pair in places.windows(2).filter(|pair| pair[0].1.segment == pair[1].1.segment) {
+    let follows = |pair: &&[(Pose2, Arc<Place>)]| {
+        pair[0].1.segment == pair[1].1.segment && pair[0].0.distance_m(&pair[1].0) <= STRIDE_MAX_M
+    };
+    for pair in places.windows(2).filter(follows) {
         let (a, b) = (pair[0].0, pair[1].0);
-        let steps = (a.distance_m(&b).min(STRIDE_MAX_M) / resolution_m).ceil().max(1.0);
+        let steps = (a.distance_m(&b) / resolution_m).ceil().max(1.0);
         for k in 0..=steps as usize {
             let share = k as f64 / steps;
             let (x, y) = (a.x_m + share * (b.x_m - a.x_m), a.y_m + share * (b.y_m - a.y_m));
@@ -159,6 +162,15 @@ impl Board {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn where_a_robot_stood_nothing_stands() {
+        let mut b = Board { odds: vec![CLAMP; 100], known: vec![true; 100], width: 10, height: 10 };
+        b.drive((5, 5), 2);
+        let free: Vec<usize> = (0..100).filter(|&k| b.odds[k] == -CLAMP).collect();
+        assert_eq!((free.len(), free[0], free[12]), (13, 35, 75), "a disc of radius 2");
+        b.drive((0, 0), 3);
+    }
 
     #[test]
     fn a_ray_clears_every_cell_but_its_last() {

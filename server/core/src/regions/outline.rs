@@ -14,9 +14,10 @@ pub struct Outline {
     pub holes_m: Vec<Vec<(f64, f64)>>,
 }
 
-/// The outlines of cells that hang together; the longest is that around all of them.
-pub fn outline(raster: &Raster, cells: &[usize]) -> Outline {
-    let mut loops = loops(raster, cells);
+/// The outlines of cells that hang together; `is_in` tells them from others.
+pub fn outline(raster: &Raster, cells: &[usize], is_in: &dyn Fn(usize) -> bool) -> Outline {
+    // The largest goes around all of them.
+    let mut loops = loops(raster, cells, is_in);
     loops.sort_by_key(|line| std::cmp::Reverse(doubled_area(line).abs()));
     let to_map = |corners: Vec<(i64, i64)>| {
         let metres = |(x, y): (i64, i64)| {
@@ -33,14 +34,10 @@ pub fn outline(raster: &Raster, cells: &[usize]) -> Outline {
 }
 
 /// Closed lines along the edges of cells, cells to the left, by corners of the raster.
-fn loops(raster: &Raster, cells: &[usize]) -> Vec<Vec<(i64, i64)>> {
+pub(super) fn loops(raster: &Raster, cells: &[usize], is_in: &dyn Fn(usize) -> bool) -> Vec<Vec<(i64, i64)>> {
     let width = raster.width as i64;
-    let mut is_in = vec![false; raster.free.len()];
-    for &cell in cells {
-        is_in[cell] = true;
-    }
     let has = |x: i64, y: i64| {
-        (0..width).contains(&x) && (0..raster.height as i64).contains(&y) && is_in[(y * width + x) as usize]
+        (0..width).contains(&x) && (0..raster.height as i64).contains(&y) && is_in((y * width + x) as usize)
     };
     // From each corner where edges go on; two at corners where cells touch.
     let mut edges: BTreeMap<(i64, i64), Vec<(i64, i64)>> = BTreeMap::new();
@@ -92,7 +89,7 @@ fn loops(raster: &Raster, cells: &[usize]) -> Vec<Vec<(i64, i64)>> {
 }
 
 /// Twice the area that a closed line goes around, positive counter-clockwise.
-fn doubled_area(line: &[(i64, i64)]) -> i64 {
+pub(super) fn doubled_area(line: &[(i64, i64)]) -> i64 {
     (0..line.len()).map(|k| (line[k], line[(k + 1) % line.len()])).map(|(a, b)| a.0 * b.1 - a.1 * b.0).sum()
 }
 

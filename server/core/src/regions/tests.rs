@@ -2,7 +2,7 @@
 
 use super::basins::{Parts, basins};
 use super::clearance::clearance;
-use super::outline::outline;
+use super::outline::{doubled_area, loops, outline};
 use super::raster::Raster;
 use proptest::prelude::*;
 
@@ -31,7 +31,7 @@ fn rooms_end_at_their_doors() {
     let all: Vec<_> = doors.iter().chain(&corridor).chain(&rooms).copied().collect();
     let raster = raster(130, 110, &all);
     let (parts, clearance) = parts(&raster);
-    assert_eq!(parts.count, 3, "{:?}", parts.peak_m);
+    assert_eq!(parts.cells.len(), 3, "{:?}", parts.peak_m);
     let at = |x: usize, y: usize| parts.of[y * raster.width + x].unwrap();
     assert!(at(30, 60) != at(80, 60) && at(30, 60) != at(20, 30) && at(80, 60) != at(20, 30));
     assert_eq!(at(5, 30), at(110, 100), "a bend parts nothing");
@@ -46,7 +46,7 @@ fn rooms_end_at_their_doors() {
 fn a_corridor_ends_where_a_hall_begins_and_a_niche_is_its_rooms() {
     let raster = raster(250, 140, &[(2, 60, 100, 18), (102, 10, 140, 120), (30, 78, 12, 6)]);
     let (parts, _) = parts(&raster);
-    assert_eq!(parts.count, 2, "{:?}", parts.peak_m);
+    assert_eq!(parts.cells.len(), 2, "{:?}", parts.peak_m);
 }
 
 #[test]
@@ -56,7 +56,7 @@ fn an_outline_goes_around_all_cells_and_what_stands_in_them() {
         raster.free[y * 60 + 20..y * 60 + 30].fill(false);
     }
     let cells: Vec<usize> = (0..3600).filter(|&c| raster.free[c]).collect();
-    let outline = outline(&raster, &cells);
+    let outline = outline(&raster, &cells, &|cell| raster.free[cell]);
     assert_eq!(outline.polygon_m.len(), 4, "{:?}", outline.polygon_m);
     assert!((area(&outline.polygon_m) - 20.0).abs() < 1e-9);
     assert_eq!(outline.holes_m.len(), 1);
@@ -96,10 +96,12 @@ proptest! {
         for cell in 0..144 {
             prop_assert_eq!(parts.of[cell].is_some(), raster.free[cell]);
         }
-        for part in 0..parts.count as u32 {
-            let cells = parts.cells(part);
-            prop_assert!(!cells.is_empty());
-            let _ = outline(&raster, &cells);
+        for (part, cells) in (0..).zip(&parts.cells) {
+            prop_assert!(cells.iter().all(|&cell| parts.of[cell] == Some(part)));
+            let loops = loops(&raster, cells, &|cell| parts.of[cell] == Some(part));
+            let area: i64 = loops.iter().map(|line| doubled_area(line)).sum();
+            prop_assert_eq!(area, 2 * cells.len() as i64);
         }
+        prop_assert_eq!(parts.cells.iter().map(Vec::len).sum::<usize>(), parts.of.iter().flatten().count());
     }
 }

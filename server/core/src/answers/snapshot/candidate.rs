@@ -46,7 +46,7 @@ impl Snapshot {
         sum
     }
 
-    fn because(&self, label: LabelId, v: Vertex) -> Vec<String> {
+    pub(super) fn because(&self, label: LabelId, v: Vertex) -> Vec<String> {
         let at = self.poses[v as usize];
         let mut utterances: BTreeSet<u32> = BTreeSet::new();
         for e in self.particles[0].labels.evidence().iter().filter(|e| e.label == label) {

@@ -1,7 +1,10 @@
 use super::*;
 use crate::config::Config;
 use crate::edge::EdgeKind;
+use crate::filter::labels::{DIRECT, Evidence, Source};
 use crate::filter::particle::Edge;
+use crate::language::act::Parse;
+use crate::talk::ledger::Entry;
 use nalgebra::Matrix3;
 
 /// Two graphs, and a quarter of the posterior is neither.
@@ -61,4 +64,23 @@ fn where_am_i_asks_for_the_robot_and_nothing_else_does() {
         let query = Query::Where { text: text.into(), lang: None };
         assert_eq!(torn(TrackState::Lost).is_of_robot(&query), of_robot, "{text}");
     }
+}
+
+#[test]
+fn of_what_was_said_a_hundred_times_the_newest_sentences_are_reasons() {
+    let mut ledger = Ledger::default();
+    let mut map = torn(TrackState::Mapping);
+    map.poses = vec![Pose2::default(), Pose2::new(100.0, 0.0, 0.0)];
+    for k in 0..100 {
+        let (id, text) = (format!("u{k}"), "this is the gym".to_owned());
+        let entry = Entry { id, stamp_ns: k, text, parse: Parse::default(), held: 0, stands: true };
+        let utterance = ledger.enter(entry, false);
+        // Twice near, and the last elsewhere.
+        for place in if k < 99 { [0, 0] } else { [1, 1] } {
+            map.particles[0].labels.add(Evidence::new(utterance, 0, place, DIRECT, Source::Direct));
+        }
+    }
+    map.ledger = Arc::new(ledger);
+    let because = map.because(0, 0);
+    assert_eq!((because.len(), because[0].as_str(), because[31].as_str()), (32, "u67", "u98"));
 }

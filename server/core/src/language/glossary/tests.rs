@@ -40,6 +40,9 @@ fn a_line_that_says_nothing_is_told() {
         assert_eq!(Glossary::read(lines).unwrap_err().line, line, "{lines}");
     }
     assert_eq!(Glossary::read(&"# \n".repeat(100_000)).unwrap_err().line, 0);
+    assert_eq!(Glossary::read(&format!("a = b\na = {}", "b".repeat(1000))).unwrap_err().line, 2);
+    let many = "a|b|c|d|e|f|g|h a|b|c|d|e|f|g|h a|b|c|d|e|f|g|h = x\n".repeat(300);
+    assert_eq!(Glossary::read(&many).unwrap_err().line, 197);
     assert_eq!(glossary("# all of it is said\n\na = # nothing").english("a b"), " b");
 }
 
