@@ -146,9 +146,8 @@ fn candidate(c: query::Candidate, from: Option<&Pose2>, robot: &str) -> Candidat
         y_m,
         yaw_rad,
         cov: covariance(&c.covariance),
-        polygon_m: Vec::new(),
-        // A robot stood there; whether one can drive there from here nobody has looked yet.
-        goal: Some(Goal { x_m, y_m, yaw_rad, reachable: Reachable::Unknown }),
+        polygon_m: line(&c.polygon_m),
+        goal: Some(goal(&c.goal)),
         from_robot: from.map(|from| FromRobot {
             robot: robot.into(),
             distance_m: from.distance_m(&c.pose),
@@ -156,6 +155,24 @@ fn candidate(c: query::Candidate, from: Option<&Pose2>, robot: &str) -> Candidat
         }),
         because: c.because,
     }
+}
+
+fn goal(goal: &query::Goal) -> Goal {
+    let reachable = match goal.is_reachable {
+        None => Reachable::Unknown,
+        Some(true) => Reachable::Yes,
+        Some(false) => Reachable::No,
+    };
+    let Pose2 { x_m, y_m, yaw_rad } = goal.pose;
+    Goal { x_m, y_m, yaw_rad, reachable }
+}
+
+fn millimetres(m: f64) -> f64 {
+    (m * 1000.0).round() / 1000.0
+}
+
+fn line(line: &[(f64, f64)]) -> Vec<[f64; 2]> {
+    line.iter().map(|p| [millimetres(p.0), millimetres(p.1)]).collect()
 }
 
 /// Answer of `ask/labels`.
@@ -230,9 +247,7 @@ pub fn grid_reply(grid: query::Grid, map: MapIdentity) -> GridReply {
 
 /// Answer of `ask/regions`, coordinates to the millimetre.
 pub fn regions_reply(snapshot: &Snapshot, map: MapIdentity) -> RegionsReply {
-    let (regions, places) = (snapshot.regions(), snapshot.places());
-    let millimetres = |m: f64| (m * 1000.0).round() / 1000.0;
-    let line = |line: &[(f64, f64)]| line.iter().map(|p| [millimetres(p.0), millimetres(p.1)]).collect();
+    let (regions, places) = (&snapshot.rooms().regions, snapshot.places());
     let names = |vertices: &[u32]| {
         let mut names: BTreeMap<&str, f64> = BTreeMap::new();
         for (name, p) in vertices.iter().flat_map(|&v| &places[v as usize].labels) {
@@ -327,6 +342,8 @@ mod tests {
             p_is: 1.0,
             pose: Pose2::new(1.0, 5.0, 0.0),
             covariance: Matrix3::from_fn(|i, j| (3 * i + j) as f64),
+            polygon_m: vec![(0.0, 4.0), (2.0, 4.0), (2.0, 6.0004)],
+            goal: query::Goal { pose: Pose2::new(1.5, 5.0, 0.5), is_reachable: Some(false) },
             because: vec![],
         };
         let answer = WhereAnswer {
@@ -349,6 +366,9 @@ mod tests {
         let reply = where_reply(answer, MapIdentity::default(), Stamp { ns: 1 }, "r07");
         let from = reply.candidates[0].from_robot.as_ref().unwrap();
         assert!((from.distance_m - 3.0).abs() < 1e-12 && from.bearing_rad.abs() < 1e-12);
+        assert_eq!(reply.candidates[0].polygon_m[2], [2.0, 6.0]);
+        let goal = reply.candidates[0].goal.as_ref().unwrap();
+        assert_eq!((goal.x_m, goal.reachable), (1.5, Reachable::No));
         assert_eq!(reply.candidates[0].cov.map(|c| c as u32), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
     }
 }

@@ -29,6 +29,9 @@ struct TruthFile {
     dark_s: Vec<(f64, f64)>,
     checkpoints_s: Vec<f64>,
     names: Vec<NameFile>,
+    /// Of the questions whose name was told by relations alone, by how many.
+    #[serde(default)]
+    relations: BTreeMap<String, usize>,
     reference: Option<Vec<Vec<f64>>>,
 }
 
@@ -92,6 +95,11 @@ fn truth_files(tour: &str, language: &str, case: &Case) -> (TruthFile, BTreeMap<
         dark_s: dark_s.clone(),
         checkpoints_s: checkpoints_s.clone(),
         names: named.iter().map(|n| NameFile { t_s: n.t_s, name: n.name.clone() }).collect(),
+        relations: questions
+            .iter()
+            .filter(|q| q.relations > 0)
+            .map(|q| (q.text.clone(), q.relations))
+            .collect(),
         reference: case.reference.clone(),
     };
     (truth, asked)
@@ -108,6 +116,7 @@ impl TruthFile {
         let question = |(text, ids): (&String, &Vec<String>)| Question {
             text: text.clone(),
             rooms: ids.iter().filter_map(|id| self.regions.get(id).cloned()).collect(),
+            relations: self.relations.get(text).copied().unwrap_or(0),
         };
         Truth {
             path: Path::new(

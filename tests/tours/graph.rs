@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use toponym_core::Pose2;
-use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
+use toponym_core::answers::query::{self, GraphAnswer, WhereAnswer};
 
 /// The posterior at one moment.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -52,8 +52,19 @@ pub struct Answer {
     pub question: String,
     /// Probability that it is nowhere in the map.
     pub p_none: f64,
-    /// Where it most likely is, in the best graph's map.
-    pub best_m: Option<[f64; 2]>,
+    /// Where it may be, the likeliest first.
+    pub candidates: Vec<Candidate>,
+}
+
+/// Where something may be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Candidate {
+    /// In the best graph's map.
+    pub at_m: [f64; 2],
+    /// Probability that this is meant.
+    pub probability: f64,
+    /// Probability that the name applies here.
+    pub p_is: f64,
 }
 
 impl Graphs {
@@ -89,8 +100,13 @@ impl Graphs {
 impl Answer {
     /// Of a mapper's answer.
     pub fn of(answer: &WhereAnswer) -> Self {
-        let best = answer.candidates.first().map(|c| [c.pose.x_m, c.pose.y_m]);
-        Self { question: answer.text.clone(), p_none: answer.p_none, best_m: best }
+        let candidate = |c: &query::Candidate| Candidate {
+            at_m: [c.pose.x_m, c.pose.y_m],
+            probability: c.probability,
+            p_is: c.p_is,
+        };
+        let candidates = answer.candidates.iter().map(candidate).collect();
+        Self { question: answer.text.clone(), p_none: answer.p_none, candidates }
     }
 }
 
@@ -140,6 +156,7 @@ struct ReportAnswer {
 #[derive(Debug, Deserialize)]
 struct ReportCandidate {
     probability: f64,
+    p_is: Option<f64>,
     x_m: f64,
     y_m: f64,
 }
@@ -167,12 +184,16 @@ impl Report {
 
     /// Its answers.
     pub fn answers(&self) -> Vec<Answer> {
-        let best = |a: &ReportAnswer| {
-            let best = a.candidates.iter().max_by(|a, b| a.probability.total_cmp(&b.probability))?;
-            Some([best.x_m, best.y_m])
+        let answer = |a: &ReportAnswer| {
+            let candidate = |c: &ReportCandidate| Candidate {
+                at_m: [c.x_m, c.y_m],
+                probability: c.probability,
+                p_is: c.p_is.unwrap_or(c.probability),
+            };
+            let mut candidates: Vec<Candidate> = a.candidates.iter().map(candidate).collect();
+            candidates.sort_by(|a, b| b.probability.total_cmp(&a.probability));
+            Answer { question: a.question.clone(), p_none: a.p_none, candidates }
         };
-        let answer =
-            |a: &ReportAnswer| Answer { question: a.question.clone(), p_none: a.p_none, best_m: best(a) };
         self.answers.iter().map(answer).collect()
     }
 

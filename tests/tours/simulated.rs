@@ -7,7 +7,7 @@ use toponym_core::Pose2;
 use toponym_proto::Pose;
 use toponym_sim::STEP_S;
 use toponym_sim::reference::{Seen, Stretch, posterior};
-use toponym_sim::tours::{self, Language, Played, Said};
+use toponym_sim::tours::{self, Language, Played, Said, Told};
 
 /// Time between two rows of the true path.
 const ROW_S: f64 = 0.1;
@@ -71,7 +71,11 @@ fn hypothesis(h: &tours::Hypothesis) -> Hypothesis {
 fn spoken(played: &Played, language: Language) -> Option<Spoken> {
     let said = played.narration.get(&language)?.clone();
     let asked = played.questions.get(&language).into_iter().flatten();
-    let questions = asked.map(|(text, rooms)| Question { text: text.clone(), rooms: rooms.clone() });
+    let questions = asked.map(|(text, asked)| Question {
+        text: text.clone(),
+        rooms: asked.rooms.clone(),
+        relations: if let Told::Related(relations) = asked.told { relations } else { 0 },
+    });
     Some(Spoken {
         named: said.iter().filter_map(named).collect(),
         questions: questions.collect(),
@@ -127,7 +131,7 @@ mod tests {
 
     fn said(text: &str, held: bool) -> Said {
         let sentence = Sentence { began_s: 3.0, ended_s: 4.0, text: text.into() };
-        Said { sentence, claim: Some(Claim { name: "gym".into(), at: [0.0, 0.0], held }) }
+        Said { sentence, claim: Some(Claim { name: "gym".into(), at: [0.0, 0.0], held, relations: 0 }) }
     }
 
     #[test]

@@ -112,7 +112,7 @@ impl Truth {
             ids.iter().filter_map(|id| self.regions.get(id).cloned()).collect()
         };
         let question =
-            |(text, ids): (&String, &Vec<String>)| Question { text: text.clone(), rooms: rooms(text, ids) };
+            |(text, ids): (&String, &Vec<String>)| Question { text: text.clone(), rooms: rooms(text, ids), relations: 0 };
         let truly = |s: &&Sentence| self.utterances.contains(s);
         let named = |s: &Sentence| Some(Named { t_s: s.t, name: outright(&s.text)?.to_lowercase() });
         Spoken {

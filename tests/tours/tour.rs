@@ -119,8 +119,8 @@ pub mod tests {
         let spoken = Spoken {
             named: vec![Named { t_s: gym.began_s, name: "gym".into() }],
             questions: vec![
-                Question { text: "where is the gym".into(), rooms: room.into_iter().collect() },
-                Question { text: "where is the pool".into(), rooms: vec![] },
+                Question { text: "where is the gym".into(), rooms: room.into_iter().collect(), relations: 0 },
+                Question { text: "where is the pool".into(), rooms: vec![], relations: 0 },
             ],
             said,
             reference: None,

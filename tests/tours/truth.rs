@@ -52,6 +52,8 @@ pub struct Question {
     pub text: String,
     /// Outlines of the right rooms, in the frame of the true path.
     pub rooms: Vec<Outline>,
+    /// By how many relations alone the name was told; 0: outright, or nobody looked.
+    pub relations: usize,
 }
 
 /// All that a run is scored against.

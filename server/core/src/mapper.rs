@@ -3,6 +3,7 @@
 mod standing;
 mod unseen;
 
+use crate::answers::named::Named;
 use crate::answers::snapshot::{Now, Snapshot, open_poses};
 use crate::answers::spoken;
 use crate::edge::Vertex;
@@ -22,7 +23,7 @@ use crate::trial::Trial;
 use crate::{Answer, Config, Event, Query};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 /// The robot's pose in the map has changed by this without a motion: that is told …
 const JUMP_M: f64 = 0.05;
@@ -42,6 +43,9 @@ pub struct Mapper {
     rev: u64,
     /// Changes of coordinates since the last jump, too small to tell each: the map's frame now from that told.
     untold: Pose2,
+    /// Rooms of the posterior as it is, once somebody asked for them.
+    #[serde(skip)]
+    named: Arc<OnceLock<Named>>,
     /// What is spoilt on purpose; goes with a restart.
     #[serde(skip)]
     trial: Trial,
@@ -94,6 +98,7 @@ impl Mapper {
             epoch: 0,
             rev: 0,
             untold: Pose2::default(),
+            named: Arc::default(),
             trial,
         }
     }
@@ -129,6 +134,7 @@ impl Mapper {
         Arc::new(Snapshot::new(
             &self.filter,
             self.talk.ledger.clone(),
+            self.named.clone(),
             self.track.front.open_places().cloned().collect(),
             Now {
                 robot: self.map_from_body(),
@@ -232,6 +238,7 @@ impl Mapper {
         let before = self.map_from_body();
         effects.extend(change(&mut self.filter, &mut self.talk));
         self.rev += 1;
+        self.named = Arc::default();
         self.standing.renew();
         if let (Some(old), Some(new)) = (before, self.map_from_body()) {
             self.moved(&old, &new, effects);

@@ -8,6 +8,7 @@
 //! cargo run --release -p toponym-server --example drives -- absence --seeds 20
 //! cargo run --release -p toponym-server --example drives -- faults --seeds 200 --plans PLANS
 //! cargo run --release -p toponym-server --example drives -- rooms --seeds 20 --plans PLANS
+//! cargo run --release -p toponym-server --example drives -- described --seeds 200 --plans PLANS --out weights.rs
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
 //! shows on buildings not learned from how often fits are true that are called so with some probability.
@@ -23,6 +24,7 @@ mod absence;
 mod chance;
 mod coverage;
 mod dark;
+mod described;
 mod drive;
 mod faults;
 mod logistic;
@@ -91,6 +93,21 @@ enum What {
         #[arg(long, default_value_t = 20)]
         seeds: u64,
     },
+    /// Which room is meant by "next to the kitchen": learns the weights and shows what they are worth elsewhere.
+    Described {
+        /// Folder with floor plans (XML of the KTH campus data set).
+        #[arg(long)]
+        plans: PathBuf,
+        /// The first seed.
+        #[arg(long, default_value_t = 1)]
+        from: u64,
+        /// How many.
+        #[arg(long, default_value_t = 200)]
+        seeds: u64,
+        /// Where to write the weights.
+        #[arg(long)]
+        out: Option<PathBuf>,
+    },
     /// Errors of the chain over dark stretches, and what it claims.
     Dark {
         /// Kinds of tours, or how they begin; none: all of them.
@@ -115,6 +132,9 @@ fn main() {
             faults::report(plans.as_deref(), from..from + seeds, only.as_deref(), clean);
         }
         What::Rooms { plans, from, seeds } => rooms::report(plans.as_deref(), from..from + seeds),
+        What::Described { plans, from, seeds, out } => {
+            described::report(&plans, from..from + seeds, out.as_deref());
+        }
         What::Absence { seeds } => absence::report(1001..1001 + seeds),
         What::Dark { kinds, seeds, each } => dark::report(&kinds, 1..seeds + 1, each),
     }

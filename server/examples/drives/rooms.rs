@@ -105,8 +105,8 @@ fn played(recording: &Recording, rooms: &[Polygon]) -> Option<Score> {
     let to_truth = alignment(&rows);
     let entered = |room: &&Polygon| truth.values().any(|p| contains(room, p.x_m, p.y_m));
     let rooms: Vec<Polygon> = rooms.iter().filter(entered).cloned().collect();
-    let regions = snapshot.regions();
-    (!rooms.is_empty() && !regions.is_empty()).then(|| scored(&rooms, &regions, &to_truth))
+    let regions = &snapshot.rooms().regions;
+    (!rooms.is_empty() && !regions.is_empty()).then(|| scored(&rooms, regions, &to_truth))
 }
 
 fn scored(rooms: &[Polygon], regions: &[Region], to_truth: &dyn Fn(f64, f64) -> (f64, f64)) -> Score {

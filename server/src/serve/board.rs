@@ -13,6 +13,7 @@ use toponym_journal::Event;
 use toponym_proto::answer::{MapIdentity, Problem, RobotState};
 use toponym_proto::{Keys, Stamp};
 
+use super::answered::Answered;
 use super::door::Arrival;
 use super::scribe::Work;
 use crate::fold::Card;
@@ -32,6 +33,8 @@ pub struct MapView {
     pub robot: String,
     /// Newest posterior.
     pub snapshot: ArcSwap<Snapshot>,
+    /// What was answered from it.
+    pub answered: Answered,
     /// Newest stamp in it, ns.
     pub stamp_ns: AtomicI64,
     /// (boot, seq) of the last of its robot's messages that is on disk, or given up.
@@ -84,6 +87,7 @@ impl MapView {
             uuid: card.uuid.clone(),
             robot: card.robot.clone(),
             snapshot: ArcSwap::new(snapshot),
+            answered: Answered::default(),
             stamp_ns: AtomicI64::new(card.stamp_ns),
             durable: Mutex::new(durable),
             backlog_bytes: AtomicUsize::new(0),

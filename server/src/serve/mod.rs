@@ -13,6 +13,7 @@
 //! zenoh queries ─► blocking tasks: answers from the Board, never from the filter
 //! ```
 
+mod answered;
 pub mod args;
 pub mod board;
 pub mod door;

@@ -148,9 +148,10 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
         Ask::Where => {
             let [name, text, lang, robot] = take(arguments, ["name", "text", "lang", "robot"])?;
             check_robot(map, robot.as_deref())?;
-            let query = where_query(name, text, lang)?;
-            check_localised(&snapshot, &query, robot.is_some())?;
-            query
+            let (text, lang) = (asked(name, text)?, known(lang)?);
+            check_localised(&snapshot, (&text, lang.as_deref()), robot.is_some())?;
+            let answer = map.answered.where_is(&snapshot, &text, lang.as_deref());
+            return json(&convert::where_reply(answer, identity, map.stamp(), &map.robot));
         }
         Ask::Labels | Ask::Graph => {
             let [] = take(arguments, [])?;
@@ -166,7 +167,6 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
         }
     };
     match (ask, snapshot.answer(&query)) {
-        (Ask::Where, Answer::Where(a)) => json(&convert::where_reply(a, identity, map.stamp(), &map.robot)),
         (Ask::Labels, Answer::Labels(a)) => json(&convert::labels_reply(a, identity)),
         (Ask::Graph, Answer::Graph(a)) => json(&convert::graph_reply(a, identity)),
         (Ask::Grid, Answer::Grid(a)) => json(&convert::grid_reply(a, identity)),
@@ -179,7 +179,8 @@ pub fn graph(map: &MapView) -> Result<Vec<u8>, Problem> {
     answer_about(map, Ask::Graph, Arguments::new())
 }
 
-fn where_query(name: Option<String>, text: Option<String>, lang: Option<String>) -> Result<Query, Problem> {
+/// The name or the question.
+fn asked(name: Option<String>, text: Option<String>) -> Result<String, Problem> {
     let ((Some(text), None) | (None, Some(text))) = (name, text) else {
         return Err(Problem::new(ErrorCode::BadArgument, "give either name or text")
             .field("name")
@@ -188,14 +189,16 @@ fn where_query(name: Option<String>, text: Option<String>, lang: Option<String>)
     if text.trim().is_empty() {
         return Err(Problem::new(ErrorCode::BadArgument, "name is empty").field("name"));
     }
-    if !Speech::knows(lang.as_deref()) {
-        let message =
-            format!("lang is {:?}; this server reads {}", lang.unwrap_or_default(), Speech::known());
-        return Err(Problem::new(ErrorCode::BadArgument, message)
-            .field("lang")
-            .hint("?name=K%C3%BCche;lang=de"));
+    Ok(text)
+}
+
+/// A language, if this server reads it.
+fn known(lang: Option<String>) -> Result<Option<String>, Problem> {
+    if Speech::knows(lang.as_deref()) {
+        return Ok(lang);
     }
-    Ok(Query::Where { text, lang })
+    let message = format!("lang is {:?}; this server reads {}", lang.unwrap_or_default(), Speech::known());
+    Err(Problem::new(ErrorCode::BadArgument, message).field("lang").hint("?name=K%C3%BCche;lang=de"))
 }
 
 fn check_robot(map: &MapView, robot: Option<&str>) -> Result<(), Problem> {
@@ -210,12 +213,16 @@ fn check_robot(map: &MapView, robot: Option<&str>) -> Result<(), Problem> {
 }
 
 /// What counts from the robot can't be told of one that is lost; all else stands in the map's frame.
-fn check_localised(snapshot: &Snapshot, query: &Query, of_robot: bool) -> Result<(), Problem> {
+fn check_localised(
+    snapshot: &Snapshot,
+    (text, lang): (&str, Option<&str>),
+    of_robot: bool,
+) -> Result<(), Problem> {
     // To read a question takes longer than to answer it: only where it matters.
     if snapshot.state() != TrackState::Lost {
         return Ok(());
     }
-    if of_robot || snapshot.is_of_robot(query) {
+    if of_robot || snapshot.is_of_robot(text, lang) {
         let message = "the robot doesn't know where it is";
         let hint = "ask without robot= for where things are in the map";
         return Err(Problem::new(ErrorCode::NotLocalised, message).field("robot").hint(hint));

@@ -78,7 +78,7 @@ fn what_the_servers_map_makes_of_a_folder_scores_as_the_run_itself() {
         end
     };
     assert_eq!(rounded(&outcomes[0]), rounded(&own));
-    assert_eq!((outcomes[0].labels, outcomes[0].answers), (own.labels, own.answers));
+    assert_eq!((outcomes[0].labels, &outcomes[0].answers), (own.labels, &own.answers));
     assert!((outcomes[0].ate_rmse_m.unwrap() - own.ate_rmse_m.unwrap()).abs() < 0.02);
     let mass = |outcome: &Outcome| (outcome.mass_true(3).unwrap() * 1e9).round();
     assert_eq!((outcomes[0].seed, mass(&outcomes[0])), (3, mass(&own)));

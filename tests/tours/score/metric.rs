@@ -1,14 +1,11 @@
-//! The best graph's map laid on the truth: its error, and where it says that things are.
+//! The best graph's map laid on the truth: its error, and what places are called.
 
 use super::checkpoint::Share;
-use crate::graph::{Answer, Graphs};
-use crate::truth::{Named, Outline, Path, Question, Truth};
+use crate::graph::Graphs;
+use crate::truth::{Named, Path, Truth};
 use toponym_core::Pose2;
 use toponym_core::language::Speech;
-use toponym_sim::geom::{Area, Point};
 
-/// An answer this near to a right room is right.
-const NEAR_M: f64 = 3.0;
 /// Rows of a trajectory further than this from the truth's stamps are left out.
 const SLACK_S: f64 = 0.1;
 
@@ -72,31 +69,6 @@ fn spelled(name: &str) -> String {
     Speech::default().parse_query(name).map_or_else(|| name.to_lowercase(), |n| n.as_str().to_owned())
 }
 
-/// Questions answered rightly: in a right room, or by not knowing what was never said. A question that
-/// nothing was answered to is answered wrongly.
-pub fn answers(answers: &[Answer], questions: &[Question], true_from_map: &Pose2) -> Share {
-    let right = |q: &Question| {
-        answers.iter().find(|a| a.question == q.text).is_some_and(|a| is_right(a, &q.rooms, true_from_map))
-    };
-    Share::count(questions.iter().map(right))
-}
-
-fn is_right(answer: &Answer, rooms: &[Outline], true_from_map: &Pose2) -> bool {
-    if rooms.is_empty() {
-        return answer.p_none > 0.5;
-    }
-    let Some([x, y]) = answer.best_m else { return false };
-    let (x_m, y_m) = true_from_map.apply(x, y);
-    rooms.iter().any(|room| distance_m(room, [x_m, y_m]) <= NEAR_M)
-}
-
-/// How far a point is outside of an outline.
-fn distance_m(corners: &Outline, p: Point) -> f64 {
-    let area = Area { corners: corners.clone() };
-    let to_edge_m = || area.edges().map(|e| e.distance_m(p)).fold(f64::INFINITY, f64::min);
-    if area.contains(p, 0.0) { 0.0 } else { to_edge_m() }
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::topology::tests::out_and_back;
@@ -118,31 +90,6 @@ mod tests {
         trajectory.push((99.0, Pose2::new(1e3, 1e3, 0.0)));
         assert!(lay(&trajectory, &path).unwrap().rmse_m < 1e-9);
         assert_eq!(lay(&[], &path), None);
-    }
-
-    #[test]
-    fn an_outline_is_left_by_so_many_metres() {
-        let room = vec![[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]];
-        assert!(distance_m(&room, [1.0, 1.0]).abs() < 1e-12);
-        assert!((distance_m(&room, [7.0, 1.0]) - 3.0).abs() < 1e-12);
-        assert!((distance_m(&room, [-3.0, 6.0]) - 5.0).abs() < 1e-12);
-    }
-
-    #[test]
-    fn an_answer_is_right_in_a_right_room_and_unsure_of_what_was_never_said() {
-        let room = vec![[0.0, 0.0], [4.0, 0.0], [4.0, 2.0], [0.0, 2.0]];
-        let question = |text: &str, rooms| Question { text: text.into(), rooms };
-        let questions =
-            [question("gym", vec![room.clone()]), question("pool", vec![]), question("hall", vec![room])];
-        let answer = |question: &str, p_none, best_m| Answer { question: question.into(), p_none, best_m };
-        let said = |gym_m, pool| [answer("gym", 0.1, gym_m), answer("pool", pool, Some([0.0, 0.0]))];
-        // The map lies 10 m to the left of the truth.
-        let right = Pose2::new(10.0, 0.0, 0.0);
-        let score = |gym_m, pool| answers(&said(gym_m, pool), &questions, &right).right;
-        assert_eq!(score(Some([-3.1, 1.0]), 0.6), 2, "2.9 m beyond the wall");
-        assert_eq!(score(Some([-2.9, 1.0]), 0.6), 1);
-        assert_eq!(score(None, 0.4), 0);
-        assert_eq!(answers(&said(None, 0.4), &questions, &right).of, 3, "not answered is wrong");
     }
 
     #[test]

@@ -1,11 +1,15 @@
 //! From a run and the truth to figures.
 
+mod answers;
+mod assurance;
 mod checkpoint;
 mod metric;
 mod spread;
 mod summary;
 mod topology;
 
+pub use answers::Answered;
+pub use assurance::Answers;
 pub use checkpoint::{Checkpoint, Share};
 pub use spread::{Calibration, Spread};
 pub use summary::{Masses, NegLog, Rate, Setting, Summary};
@@ -74,8 +78,8 @@ pub struct Outcome {
     pub ate_rmse_m: Option<f64>,
     /// Names said outright that are at their place.
     pub labels: Share,
-    /// Questions answered rightly.
-    pub answers: Share,
+    /// How questions were answered.
+    pub answers: Vec<Answered>,
     /// Posterior mass of graphs that were dropped, if told.
     pub unresolved: Option<f64>,
     /// Processor time per second of tour, if known.
@@ -118,8 +122,8 @@ impl Outcome {
             moments: mapped.moments.clone(),
             ate_rmse_m: laid.map(|l| l.rmse_m),
             labels: end.map_or(Share::default(), |graphs| metric::labels(graphs, truth)),
-            answers: laid.map_or(Share::default(), |l| {
-                metric::answers(&mapped.answers, &truth.questions, &l.true_from_map)
+            answers: laid.map_or(Vec::new(), |l| {
+                answers::answered(&mapped.answers, &truth.questions, &l.true_from_map)
             }),
             unresolved: mapped.unresolved,
             cpu_ms_per_s: mapped.cpu_ms_per_s,

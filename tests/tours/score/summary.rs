@@ -1,7 +1,8 @@
 //! Figures of a tour over its seeds: what is printed, and what `--json` writes.
 
 use super::spread::{Bad, Claim, median};
-use super::{Calibration, Moment, Outcome, Share, Spread};
+use super::answers::right;
+use super::{Answers, Calibration, Moment, Outcome, Share, Spread};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -42,6 +43,8 @@ pub struct Summary {
     pub ate_rmse_m: Option<Spread>,
     pub label_accuracy: Rate,
     pub answers_right: Rate,
+    #[serde(flatten)]
+    pub answers: Answers,
     pub calibration: Option<Calibration>,
     pub calibration_below_95: Option<Calibration>,
     pub assured_wrong: AssuredWrong,
@@ -141,7 +144,8 @@ impl Summary {
             top_particles_all_true: median(&each(|o| Some(o.end()?.top_all_true as f64))),
             ate_rmse_m: Spread::of(&each(|o| o.ate_rmse_m), Bad::High),
             label_accuracy: Rate::of(outcomes, |o| o.labels),
-            answers_right: Rate::of(outcomes, |o| o.answers),
+            answers_right: Rate::of(outcomes, |o| right(&o.answers)),
+            answers: Answers::of(outcomes),
             calibration: Calibration::of(&claims),
             calibration_below_95: Calibration::of_unsure(&claims),
             assured_wrong: AssuredWrong::of(outcomes, &claims),
@@ -179,7 +183,7 @@ impl Masses {
 }
 
 impl Rate {
-    fn of(outcomes: &[Outcome], share: fn(&Outcome) -> Share) -> Self {
+    pub fn of(outcomes: &[Outcome], share: impl Fn(&Outcome) -> Share) -> Self {
         let sum = outcomes
             .iter()
             .map(share)
@@ -303,7 +307,7 @@ mod tests {
             moments: vec![moment(1, true), moment(3, seed != 1)],
             ate_rmse_m: Some(seed as f64),
             labels: Share { right: 1, of: 2 },
-            answers: Share { right: 3, of: 3 },
+            answers: Vec::new(),
             unresolved: None,
             cpu_ms_per_s: None,
             reference: Some(Reference { mass: rows(reference), mass_true: vec![1.0, 1.0, 1.0, reference] }),

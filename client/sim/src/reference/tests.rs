@@ -283,7 +283,7 @@ fn words_decide_and_can_be_outvoted() {
         .map(|(name, k)| {
             let began_s = to_s + f64::from(k) / 10.0;
             let sentence = Sentence { began_s, ended_s: began_s + 2.0, text: String::new() };
-            let claim = Claim { name: (*name).into(), at: [20.0, 4.0], held: *name == "left" };
+            let claim = Claim { name: (*name).into(), at: [20.0, 4.0], held: *name == "left", relations: 0 };
             Said { sentence, claim: Some(claim) }
         })
         .collect();

@@ -15,9 +15,12 @@
 
 mod court;
 mod design;
+mod layout;
 mod plain;
+mod related;
 mod ring;
 mod stamp;
+pub mod statements;
 mod strain;
 #[cfg(test)]
 mod tests;
@@ -31,6 +34,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::str::FromStr;
 use toponym_proto::{Message, Pose, Stamp};
+
+/// The name of a tour of a floor plan.
+pub(crate) const PLANS: &str = "plans";
 
 /// Sets the draws of the second day apart from the first.
 const SECOND_DAY: u64 = 0x5ec0_0dda_0000_0000;
@@ -138,6 +144,8 @@ pub struct Claim {
     pub at: Point,
     /// Whether that room is called so; a false sentence gives it another one's name.
     pub held: bool,
+    /// By how many relations it is told of; 0: from within.
+    pub relations: usize,
 }
 
 /// A sentence of a narration.
@@ -149,9 +157,29 @@ pub struct Said {
     pub claim: Option<Claim>,
 }
 
-/// Questions, each with the rooms that are right (corners in order round them, world frame); none:
-/// it was never said, and no place at all is right.
-pub type Questions = BTreeMap<String, Vec<Vec<Point>>>;
+/// How a name was told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Told {
+    /// Never: no place at all is right.
+    #[default]
+    Never,
+    /// From within a room.
+    Outright,
+    /// By so many relations alone.
+    Related(usize),
+}
+
+/// What is right to answer.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Asked {
+    /// Corners of the rooms that are right, in order round them, world frame.
+    pub rooms: Vec<Vec<Point>>,
+    /// How their name was told.
+    pub told: Told,
+}
+
+/// Questions with their answers.
+pub type Questions = BTreeMap<String, Asked>;
 
 /// A tour before any noise.
 #[derive(Clone, Debug)]

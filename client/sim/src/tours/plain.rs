@@ -1,14 +1,16 @@
 //! Buildings without look-alikes, and one that is its own half turn.
 
-use super::Tour;
 use super::design::{Design, Walk};
 use super::stamp::Quarter;
 use super::unit::WALL_M;
 use super::words::Names;
+use super::{PLANS, Tour};
 use crate::building::{demo_building, furnish_once, pieces};
-use crate::geom::Rect;
+use crate::geom::{Rect, distance_m};
 use crate::random::Draw;
-use crate::world::{Plan, World};
+use crate::storey::Storey;
+use crate::world::{Plan, RoomKind, World};
+use std::collections::BTreeSet;
 use crate::{Fault, FloorPlan, OfficeStyle, Scenario, SimError};
 use toponym_proto::Pose;
 
@@ -43,16 +45,72 @@ pub(super) fn office(name: &'static str, seed: u64) -> Result<Tour, SimError> {
     Ok(design.tour(name, seed).0)
 }
 
-/// A real floor plan, its rooms drawn by chance, some visited once more in the end: `plans`.
+/// Rooms on a tour of a floor plan, of which [`AGAIN`] are visited once more; mostly near others, …
+const PLAN_STOPS: usize = 10;
+/// … with this share.
+const NEXT_BY: f64 = 0.7;
+/// Share of the rooms whose name another room on the tour bears, too, that keep it.
+const ALIASED: f64 = 0.25;
+
+/// A real floor plan, some of its rooms visited once more in the end: `plans`.
 pub(super) fn plan(plan: &FloorPlan, seed: u64) -> Result<Tour, SimError> {
-    let scenario = Scenario::floor_plan(plan, STOPS, seed)?;
-    let tour = &scenario.tour;
-    let mut walk = Walk::from_room(&scenario.world, *tour.first().ok_or(SimError::NoTour)?)?;
+    let Storey { world, stops } = Storey::new(plan, &mut Draw::new(seed, 3));
+    if stops.len() < 2 {
+        return Err(SimError::TooSmall(stops.len()));
+    }
+    let mut draw = Draw::new(seed, 2);
+    let tour = near_each_other(&world, stops, &mut draw);
+    let (world, more) = renamed(world, &tour, &mut draw);
+    let mut walk = Walk::from_room(&world, tour[0])?;
     for &room in tour[1..].iter().chain(tour.iter().take(AGAIN)) {
         walk.to(room)?;
     }
     let (start, legs) = (walk.start, walk.legs);
-    Ok(Design::plain(scenario.world, start, legs).tour("plans", seed).0)
+    let mut tour = Design::plain(world, start, legs).tour(PLANS, seed).0;
+    tour.vocabulary.extend(more);
+    tour.vocabulary.sort();
+    tour.vocabulary.dedup();
+    Ok(tour)
+}
+
+/// Rooms to visit, as people show a building: mostly one by the last, at times one far off.
+fn near_each_other(world: &World, mut left: Vec<usize>, draw: &mut Draw) -> Vec<usize> {
+    let mut tour: Vec<usize> = vec![left.swap_remove(draw.below(left.len()))];
+    while tour.len() < PLAN_STOPS && !left.is_empty() {
+        let from = world.rooms[tour[draw.below(tour.len())]].area.centre();
+        let far_m = |k: &usize| distance_m(world.rooms[left[*k]].area.centre(), from);
+        let next = match draw.chance(NEXT_BY) {
+            true => (0..left.len()).min_by(|a, b| far_m(a).total_cmp(&far_m(b))).unwrap_or_default(),
+            false => draw.below(left.len()),
+        };
+        tour.push(left.swap_remove(next));
+    }
+    tour
+}
+
+/// The rooms of a tour with names that mostly are theirs alone, and all other rooms without; beside them the names that
+/// were left out.
+fn renamed(mut world: World, tour: &[usize], draw: &mut Draw) -> (World, Vec<String>) {
+    let mut fresh = Names::new(draw);
+    let mut used: BTreeSet<String> = BTreeSet::new();
+    for &room in tour {
+        let name = world.rooms[room].name.clone();
+        if !name.is_empty() && (!used.contains(&name) || draw.chance(ALIASED)) {
+            used.insert(name);
+            continue;
+        }
+        let name = std::iter::from_fn(|| Some(fresh.next())).take(64).find(|n| !used.contains(*n)).unwrap_or_default();
+        used.insert(name.to_owned());
+        world.rooms[room].name = name.to_owned();
+    }
+    let mut more = Vec::new();
+    for (k, room) in world.rooms.iter_mut().enumerate() {
+        if room.kind == RoomKind::Room && !tour.contains(&k) {
+            more.push(std::mem::take(&mut room.name));
+        }
+    }
+    more.retain(|name| !name.is_empty() && !used.contains(name));
+    (world, more)
 }
 
 /// Half of a ring of corridors with rooms: its half turn makes it whole.

@@ -1,6 +1,7 @@
 //! What the guide of a tour says.
 
-use super::{Claim, Language, Questions, Said, Tour};
+use super::related::related;
+use super::{Asked, Claim, Language, PLANS, Questions, Said, Told, Tour};
 use crate::building::NAMES;
 use crate::geom::Point;
 use crate::guide::{Visit, spoken, visits};
@@ -51,21 +52,23 @@ impl Names {
 
 /// How something is said.
 #[derive(Clone, Debug)]
-enum Form {
+pub(super) enum Form {
     This,
     Another,
     Again,
     Down(String),
     NextTo(String),
+    /// By so many relations.
+    Lies(String, usize),
 }
 
 /// A sentence before it is words.
 #[derive(Clone, Debug)]
-struct Thought {
-    at_s: f64,
-    visit: usize,
-    room: usize,
-    form: Form,
+pub(super) struct Thought {
+    pub at_s: f64,
+    pub visit: usize,
+    pub room: usize,
+    pub form: Form,
 }
 
 impl Form {
@@ -76,6 +79,16 @@ impl Form {
             Self::Again => format!("We are in the {name} again."),
             Self::Down(corridor) => format!("The {name} is down the {corridor}."),
             Self::NextTo(room) => format!("The {name} is next to the {room}."),
+            Self::Lies(how, _) => format!("The {name} is {how}."),
+        }
+    }
+
+    /// By how many relations it tells of a room; 0: where it is.
+    fn relations(&self) -> usize {
+        match self {
+            Self::This | Self::Another | Self::Again => 0,
+            Self::Down(_) | Self::NextTo(_) => 1,
+            Self::Lies(_, relations) => *relations,
         }
     }
 }
@@ -88,8 +101,10 @@ pub(super) fn narrate(tour: &Tour, language: Language) -> Vec<Said> {
     let stays = visits(&tour.scenario.world, &tour.drive);
     let mut thoughts = here(tour, &stays);
     let mut draw = Draw::new(tour.seed, 9);
-    if language != Language::Simple {
-        elsewhere(tour, &stays, &mut thoughts, &mut draw);
+    match (language, tour.name) {
+        (Language::Simple, _) => {}
+        (_, PLANS) => related(tour, &stays, &mut thoughts, &mut draw),
+        _ => elsewhere(tour, &stays, &mut thoughts, &mut draw),
     }
     thoughts.sort_by(|a, b| a.at_s.total_cmp(&b.at_s));
     let phase = draw.below(FALSE_EACH);
@@ -101,8 +116,8 @@ pub(super) fn narrate(tour: &Tour, language: Language) -> Vec<Said> {
         let other = others[draw.below(others.len())];
         let name = if held { name } else { other };
         let sentence = spoken(thought.at_s, thought.form.words(name));
-        let at = rooms[thought.room].area.centre();
-        Said { sentence, claim: Some(Claim { name: name.clone(), at, held }) }
+        let (at, relations) = (rooms[thought.room].area.centre(), thought.form.relations());
+        Said { sentence, claim: Some(Claim { name: name.clone(), at, held, relations }) }
     };
     thoughts.iter().enumerate().map(say).collect()
 }
@@ -216,11 +231,15 @@ pub(super) fn questions(tour: &Tour, said: &[Said]) -> Questions {
     let mut questions = Questions::new();
     for name in &tour.vocabulary {
         let claims = || said.iter().filter_map(|s| s.claim.as_ref()).filter(|c| c.name == *name);
-        if claims().next().is_some() && !claims().any(|c| c.held) {
-            continue;
-        }
-        let right = if claims().next().is_some() { rooms_called(tour, name) } else { Vec::new() };
-        questions.insert(format!("where is the {name}"), right);
+        let held: Vec<usize> = claims().filter(|c| c.held).map(|c| c.relations).collect();
+        let told = match (claims().next(), held.as_slice()) {
+            (None, _) => Told::Never,
+            (Some(_), []) => continue,
+            (_, held) if held.contains(&0) => Told::Outright,
+            (_, held) => Told::Related(held.iter().sum()),
+        };
+        let rooms = if told == Told::Never { Vec::new() } else { rooms_called(tour, name) };
+        questions.insert(format!("where is the {name}"), Asked { rooms, told });
     }
     questions
 }

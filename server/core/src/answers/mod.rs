@@ -1,7 +1,9 @@
 //! Answers: the posterior at one moment, and what it is asked.
 
+pub mod described;
 pub mod differences;
 mod meaning;
+pub mod named;
 pub mod query;
 pub mod snapshot;
 pub mod spoken;

@@ -2,6 +2,7 @@
 
 use crate::edge::PlaceId;
 use crate::geometry::Pose2;
+pub use crate::regions::Goal;
 pub use crate::regions::occupancy::Grid;
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
@@ -68,7 +69,7 @@ pub struct WhereAnswer {
 /// One place that may be meant.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
-    /// The place.
+    /// The region, by its id; a place that lies in none.
     pub place: PlaceId,
     /// What it is called.
     pub label: String,
@@ -82,6 +83,11 @@ pub struct Candidate {
     pub pose: Pose2,
     /// Covariance, x y yaw, map axes.
     pub covariance: Matrix3<f64>,
+    /// Outline of the region, metres, map; empty for a place that lies in none.
+    pub polygon_m: Vec<(f64, f64)>,
+    /// Where to send a robot: free floor with room for it, looking in; a place that lies in no region is one where a
+    /// robot stood.
+    pub goal: Goal,
     /// Ids of the utterances it rests on.
     pub because: Vec<String>,
 }

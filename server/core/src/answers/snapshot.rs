@@ -1,13 +1,13 @@
 //! The posterior at one moment, immutable: what questions are answered from, over all particles.
 
 use crate::answers::differences::differences;
-use crate::answers::meaning::{Meaning, meaning};
 use crate::answers::query::{
-    Answer, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query, WhereAnswer,
+    Answer, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query,
 };
-use crate::answers::whereabouts::{Region, whereabouts};
+use crate::answers::named::Named;
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
+use crate::event::StampNs;
 use crate::filter::Filter;
 use crate::filter::labels::LabelId;
 use crate::filter::particle::Particle;
@@ -15,17 +15,15 @@ use crate::filter::prune::effective_sample_size;
 use crate::geometry::Pose2;
 use crate::graph::Place;
 use crate::language::act::{About, Act, Head, Question};
-use crate::language::{Content, Name, Speech};
-use crate::regions;
+use crate::language::{Content, GroundPlace, Name, Speech};
+use crate::regions::Rooms;
 use crate::regions::occupancy::grid;
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::places::OpenPlace;
 use std::collections::BTreeMap;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
-/// Candidates told.
-const CANDIDATES_MAX: usize = 10;
 /// Names told of a place.
 const NAMES_MAX: usize = 5;
 /// Less probable names and candidates are noise.
@@ -59,16 +57,26 @@ pub struct Snapshot {
     /// Posterior mass of graphs that were dropped.
     unresolved: f64,
     ledger: Arc<Ledger>,
+    named: Arc<OnceLock<Named>>,
+    /// Descriptions are where the paper's rule put them.
+    by_paper: bool,
     now: Now,
 }
 
 impl Snapshot {
-    pub(crate) fn new(filter: &Filter, ledger: Arc<Ledger>, open: Vec<OpenPlace>, now: Now) -> Self {
+    /// `named`: the rooms of the same posterior, once somebody asked for them.
+    pub(crate) fn new(
+        filter: &Filter,
+        ledger: Arc<Ledger>,
+        named: Arc<OnceLock<Named>>,
+        open: Vec<OpenPlace>,
+        now: Now,
+    ) -> Self {
         let places = filter.graph.places().to_vec();
         let poses = poses(filter.best(), &places, &open);
         let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
-        let unresolved = filter.unresolved();
-        Self { places, open, structure, particles, poses, unresolved, ledger, now }
+        let (unresolved, by_paper) = (filter.unresolved(), filter.config.rules.by_paper());
+        Self { places, open, structure, particles, poses, unresolved, ledger, named, by_paper, now }
     }
 
     /// +1 when the map's coordinates jump.
@@ -113,11 +121,28 @@ impl Snapshot {
         grid(&posed, resolution_m)
     }
 
-    /// Regions of the best graph.
-    pub fn regions(&self) -> Vec<regions::Region> {
-        let posed: Vec<(Pose2, Arc<Place>)> =
-            self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
-        regions::regions(&posed)
+    /// Regions of the best graph: made when first asked for, for all snapshots of one posterior together.
+    pub fn rooms(&self) -> &Rooms {
+        &self.named().rooms
+    }
+
+    /// The same with what they are called.
+    pub(crate) fn named(&self) -> &Named {
+        self.named.get_or_init(|| {
+            let posed: Vec<(Pose2, Arc<Place>)> =
+                self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
+            let (labels, ledger) = (&self.particles[0].labels, &self.ledger);
+            Named::new(Rooms::new(&posed), self.ground_places(), labels, ledger)
+        })
+    }
+
+    fn ground_places(&self) -> (Vec<GroundPlace>, Vec<StampNs>) {
+        let frozen = self.places.iter().map(|p| (p.path_m, p.stamp_ns));
+        let all = frozen.chain(self.open.iter().map(|o| (o.path_m, o.stamp_ns))).zip(&self.poses);
+        let place = |((path_m, stamp_ns), &Pose2 { x_m, y_m, yaw_rad })| {
+            (GroundPlace { x_m, y_m, yaw_rad, path_m }, stamp_ns)
+        };
+        all.map(place).unzip()
     }
 
     /// All graphs; places as in the best.
@@ -232,95 +257,17 @@ impl Snapshot {
         names
     }
 
-    /// "Where is the gym?": over all particles, which place is meant.
-    fn where_is(&self, text: &str, lang: Option<&str>) -> WhereAnswer {
-        let name = self.speech(lang).and_then(|speech| speech.parse_query(text));
-        let found = name.map(|name| self.where_named(&name));
-        WhereAnswer { text: text.to_owned(), ..found.unwrap_or_else(|| self.nowhere(None)) }
-    }
-
     fn speech(&self, lang: Option<&str>) -> Option<Speech> {
         Speech::new(lang, self.ledger.glossary.clone())
     }
 
     /// Whether a question is about the robot's own place: "where am I?" Who is lost can't be told.
-    pub fn is_of_robot(&self, query: &Query) -> bool {
-        let Query::Where { text, lang } = query else { return false };
+    pub fn is_of_robot(&self, text: &str, lang: Option<&str>) -> bool {
         let of_here = |act: &Act| match &act.content {
             Content::Ask { kind: Question::Where, about: About::Phrase(phrase) } => phrase.head == Head::Here,
             _ => false,
         };
-        self.speech(lang.as_deref()).is_some_and(|speech| speech.parse(text).acts().iter().any(of_here))
-    }
-
-    fn nowhere(&self, name: Option<&Name>) -> WhereAnswer {
-        WhereAnswer {
-            text: name.map_or_else(String::new, |n| n.as_str().to_owned()),
-            label: name.map(|n| n.as_str().to_owned()),
-            via: "unknown".to_owned(),
-            p_none: 1.0,
-            unresolved: self.unresolved,
-            candidates: Vec::new(),
-            suggestions: Vec::new(),
-            // Who is lost is nowhere to count distances from.
-            robot: self.now.robot.filter(|_| self.now.state != TrackState::Lost),
-        }
-    }
-
-    /// Where is what people may mean by a name.
-    pub(crate) fn where_named(&self, name: &Name) -> WhereAnswer {
-        let Meaning { via, p, labels, suggestions } =
-            meaning(name, &self.ledger, &|label| self.is_known(label), &|| self.known());
-        let names = |ids: Vec<LabelId>| ids.iter().map(|&id| self.ledger.name(id).to_owned()).collect();
-        let (via, suggestions) = (via.to_owned(), names(suggestions));
-        let mut answer = WhereAnswer { via, suggestions, ..self.nowhere(Some(name)) };
-        let pose = |p: &Particle, v: Vertex| self.pose(p, v);
-        let found = |&label: &LabelId| {
-            let found = whereabouts(&self.particles, &pose, label, PROBABILITY_MIN);
-            (label, found.regions, found.p_none)
-        };
-        let found: Vec<(LabelId, Vec<Region>, f64)> = labels.iter().map(found).collect();
-        // One place is meant: names that are as likely share it, as far as each is anywhere.
-        let somewhere: f64 = found.iter().map(|(.., p_none)| 1.0 - p_none).sum();
-        let share = p * self.resolved() / somewhere.max(1.0);
-        let mut all: Vec<(LabelId, Region)> = Vec::new();
-        for (label, regions, _) in found {
-            let likely = regions.into_iter().filter(|r| r.p_is >= PROBABILITY_MIN);
-            all.extend(likely.map(|r| (label, Region { probability: share * r.probability, ..r })));
-        }
-        all.sort_by(|(_, a), (_, b)| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
-        all.truncate(CANDIDATES_MAX);
-        // None of those told: of the others each is next to impossible.
-        answer.p_none = 1.0 - all.iter().map(|(_, r)| r.probability).sum::<f64>();
-        answer.candidates = all.into_iter().map(|(label, r)| self.candidate(label, r)).collect();
-        answer
-    }
-
-    /// Pose of a place, or of one that is not frozen yet, in a particle's map.
-    fn pose(&self, p: &Particle, v: Vertex) -> Option<Pose2> {
-        let frozen = p.belief.len();
-        if (v as usize) < frozen {
-            return Some(p.belief.pose(v));
-        }
-        open_poses(p, &self.places, &self.open).get(v as usize - frozen).copied()
-    }
-
-    /// Whether something speaks for a name.
-    fn is_known(&self, label: LabelId) -> bool {
-        let mut evidence = self.particles.iter().flat_map(|p| p.labels.evidence());
-        evidence.any(|e| e.label == label && e.weight > 0.0) && !self.ledger.name(label).is_empty()
-    }
-
-    /// Names that something speaks for, in the order first said.
-    fn known(&self) -> Vec<LabelId> {
-        let mut known = vec![false; self.ledger.names().len()];
-        for e in self.particles.iter().flat_map(|p| p.labels.evidence()).filter(|e| e.weight > 0.0) {
-            if let Some(known) = known.get_mut(e.label as usize) {
-                *known = true;
-            }
-        }
-        let ids = (0..known.len()).filter(|&id| known[id]).map(|id| id as LabelId);
-        ids.filter(|&id| !self.ledger.name(id).is_empty()).collect()
+        self.speech(lang).is_some_and(|speech| speech.parse(text).acts().iter().any(of_here))
     }
 
     /// Names of places so near a pose of the best map, but for one, each with the most that it applies to any of
@@ -343,12 +290,6 @@ impl Snapshot {
         let article = if canonical.with_article() == canonical.as_str() { "" } else { "the " };
         format!("{article}{}", self.ledger.spelled(name))
     }
-
-    /// Share of the posterior that the particles stand for; what was pruned and may yet be true is none of
-    /// them, and no question is answered from it.
-    fn resolved(&self) -> f64 {
-        1.0 - self.unresolved
-    }
 }
 
 /// Poses of all places, open ones too, in a particle's map.
@@ -370,5 +311,6 @@ pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Ve
 }
 
 mod candidate;
+mod find;
 #[cfg(test)]
 mod tests;

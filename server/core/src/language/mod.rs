@@ -46,7 +46,7 @@ pub use glossary::Glossary;
 pub use grammar::ask::asked_name;
 pub use grounding::clause::{LandmarkBelief, Narrowing, Reading};
 pub use grounding::footprint::Footprint;
-pub use grounding::ground::{Grounding, ground_clause, ground_with};
+pub use grounding::ground::{Grounding, densities, ground_clause, ground_with};
 pub use grounding::paper::ground_by_paper;
 pub use grounding::path_features::{FEATURES, path_features};
 pub use grounding::place::GroundPlace;

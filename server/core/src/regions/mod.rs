@@ -13,9 +13,13 @@ mod clearance;
 pub mod occupancy;
 mod outline;
 mod raster;
+mod reach;
 #[cfg(test)]
 mod tests;
 
+use self::basins::{Parts, Saddle};
+use self::raster::Raster;
+pub use self::reach::{FOOTPRINT_M, Goal};
 use crate::edge::{PlaceId, Vertex};
 use crate::geometry::Pose2;
 use crate::graph::Place;
@@ -32,6 +36,8 @@ pub struct Region {
     pub polygon_m: Vec<(f64, f64)>,
     /// Outlines of what stands in it, clockwise.
     pub holes_m: Vec<Vec<(f64, f64)>>,
+    /// Mean of its free space in the map, metres: of a bent one it may lie outside.
+    pub middle_m: (f64, f64),
     /// Area of its free space, m².
     pub area_m2: f64,
     /// Where one goes into others.
@@ -62,55 +68,127 @@ pub enum Shape {
     Hall,
 }
 
+/// What was seen and not entered counts from this size on: smaller ones are niches.
+const UNENTERED_MIN_M2: f64 = 1.5;
 /// A larger room is a hall.
 const HALL_M2: f64 = 80.0;
 /// A space so many times as long as it is wide is a corridor.
 const CORRIDOR: f64 = 4.0;
 
-/// The regions of a map that robots were in: of places with their poses in it, oldest first.
-pub fn regions(places: &[(Pose2, Arc<Place>)]) -> Vec<Region> {
-    let Some(raster) = raster::Raster::new(places) else { return Vec::new() };
-    let clearance = clearance::clearance(&raster);
-    let parts = basins::basins(&raster, &clearance);
-    let mut within: Vec<Vec<Vertex>> = vec![Vec::new(); parts.cells.len()];
-    for (v, (pose, _)) in places.iter().enumerate() {
-        if let Some(part) = raster.near(pose.x_m, pose.y_m, |cell| parts.of[cell]) {
-            within[part as usize].push(v as Vertex);
-        }
-    }
-    // Those that were seen through a door alone are none yet.
-    let mut index = vec![None; parts.cells.len()];
-    for (n, part) in (0..parts.cells.len()).filter(|&part| !within[part].is_empty()).enumerate() {
-        index[part] = Some(n);
-    }
-    (0..parts.cells.len())
-        .filter(|&part| index[part].is_some())
-        .map(|part| {
-            let cells = &parts.cells[part];
-            let outline = outline::outline(&raster, cells, &|cell| parts.of[cell] == Some(part as u32));
-            let doorways = parts.saddles.iter().filter_map(|s| {
-                let to = if s.of[0] == part as u32 {
-                    s.of[1]
-                } else if s.of[1] == part as u32 {
-                    s.of[0]
-                } else {
-                    return None;
-                };
-                let width_m = 2.0 * f64::from(clearance[s.cell]);
-                Some(Doorway { to: index[to as usize]?, at_m: raster.middle(s.cell), width_m })
-            });
-            let area_m2 = cells.len() as f64 * raster.resolution_m.powi(2);
-            Region {
-                id: places[within[part][0] as usize].1.id,
-                places: std::mem::take(&mut within[part]),
-                polygon_m: outline.polygon_m,
-                holes_m: outline.holes_m,
-                area_m2,
-                doorways: doorways.collect(),
-                shape: shape(area_m2, f64::from(parts.peak_m[part])),
+/// The regions of a map that robots were in, and what lies between and beside them.
+#[derive(Clone, Debug, Default)]
+pub struct Rooms {
+    /// The regions.
+    pub regions: Vec<Region>,
+    /// Openings from a region, by its index, into what was seen and not entered; map, metres.
+    pub unentered: Vec<(usize, (f64, f64))>,
+    floor: Option<Floor>,
+}
+
+/// The cells that regions are made of.
+#[derive(Clone, Debug)]
+struct Floor {
+    raster: Raster,
+    /// Metres to what is not free.
+    clearance: Vec<f32>,
+    /// The region of each cell.
+    of: Vec<Option<u32>>,
+    /// The cells of each region.
+    cells: Vec<Vec<usize>>,
+    /// See [`reach`].
+    drivable: Vec<Option<u32>>,
+}
+
+impl Rooms {
+    /// Of places with their poses in the map, oldest first.
+    pub fn new(places: &[(Pose2, Arc<Place>)]) -> Self {
+        let Some(raster) = Raster::new(places) else { return Self::default() };
+        let clearance = clearance::clearance(&raster);
+        let mut parts = basins::basins(&raster, &clearance);
+        let mut within: Vec<Vec<Vertex>> = vec![Vec::new(); parts.cells.len()];
+        for (v, (pose, _)) in places.iter().enumerate() {
+            if let Some(part) = raster.near(pose.x_m, pose.y_m, |cell| parts.of[cell]) {
+                within[part as usize].push(v as Vertex);
             }
-        })
-        .collect()
+        }
+        // Those that were seen through a door alone are none yet.
+        let mut index = vec![None; parts.cells.len()];
+        for (n, part) in (0..parts.cells.len()).filter(|&part| !within[part].is_empty()).enumerate() {
+            index[part] = Some(n);
+        }
+        let mut regions = Vec::new();
+        for part in (0..parts.cells.len()).filter(|&part| index[part].is_some()) {
+            let oldest = places[within[part][0] as usize].1.id;
+            let doorways = doorways(&raster, &clearance, &parts.saddles, &index, part as u32);
+            regions.push(region(&raster, &parts, part, (oldest, std::mem::take(&mut within[part])), doorways));
+        }
+        let least = (UNENTERED_MIN_M2 / raster.resolution_m.powi(2)) as usize;
+        let beyond = |from: u32, to: u32, cell: usize| {
+            let is_unentered = index[to as usize].is_none() && parts.cells[to as usize].len() >= least;
+            Some((index[from as usize].filter(|_| is_unentered)?, raster.middle(cell)))
+        };
+        let both = |s: &Saddle| [beyond(s.of[0], s.of[1], s.cell), beyond(s.of[1], s.of[0], s.cell)];
+        let unentered = parts.saddles.iter().flat_map(both).flatten().collect();
+        for part in &mut parts.of {
+            *part = part.and_then(|part| index[part as usize]).map(|n| n as u32);
+        }
+        let entered = (0..index.len()).filter(|&part| index[part].is_some());
+        let cells = entered.map(|part| std::mem::take(&mut parts.cells[part])).collect();
+        let drivable = reach::drivable(&raster, &clearance, places);
+        let floor = Floor { raster, clearance, of: parts.of, cells, drivable };
+        Self { regions, unentered, floor: Some(floor) }
+    }
+
+    /// The region in which a point of the map lies, or that is next to it.
+    pub fn at(&self, x_m: f64, y_m: f64) -> Option<usize> {
+        let floor = self.floor.as_ref()?;
+        floor.raster.near(x_m, y_m, |cell| floor.of[cell]).map(|n| n as usize)
+    }
+}
+
+/// Index of its own, and of those of its saddles behind which there is another region.
+fn doorways(
+    raster: &Raster,
+    clearance: &[f32],
+    saddles: &[Saddle],
+    index: &[Option<usize>],
+    part: u32,
+) -> Vec<Doorway> {
+    let behind = |s: &Saddle| match s.of {
+        [a, b] if a == part => Some(b),
+        [a, b] if b == part => Some(a),
+        _ => None,
+    };
+    let doorway = |s: &Saddle| {
+        let width_m = 2.0 * f64::from(clearance[s.cell]);
+        Some(Doorway { to: index[behind(s)? as usize]?, at_m: raster.middle(s.cell), width_m })
+    };
+    saddles.iter().filter_map(doorway).collect()
+}
+
+fn region(
+    raster: &Raster,
+    parts: &Parts,
+    part: usize,
+    (id, places): (PlaceId, Vec<Vertex>),
+    doorways: Vec<Doorway>,
+) -> Region {
+    let cells = &parts.cells[part];
+    let outline = outline::outline(raster, cells, &|cell| parts.of[cell] == Some(part as u32));
+    let area_m2 = cells.len() as f64 * raster.resolution_m.powi(2);
+    let middle = |axis: fn((f64, f64)) -> f64| {
+        cells.iter().map(|&c| axis(raster.middle(c))).sum::<f64>() / cells.len() as f64
+    };
+    Region {
+        id,
+        places,
+        polygon_m: outline.polygon_m,
+        holes_m: outline.holes_m,
+        middle_m: (middle(|p| p.0), middle(|p| p.1)),
+        area_m2,
+        doorways,
+        shape: shape(area_m2, f64::from(parts.peak_m[part])),
+    }
 }
 
 /// `peak_m`: the widest clearance in it.

@@ -15,6 +15,7 @@ const CLUTTER_M2: f64 = 0.5;
 const NEAR_M: f64 = 0.5;
 
 /// Free cells, row by row.
+#[derive(Clone, Debug)]
 pub struct Raster {
     pub width: usize,
     pub height: usize,
@@ -80,18 +81,30 @@ impl Raster {
         (along(self.corner_m.0, x), along(self.corner_m.1, y))
     }
 
-    /// What the nearest cell around a point has that has something.
-    pub fn near<T>(&self, x_m: f64, y_m: f64, of: impl Fn(usize) -> Option<T>) -> Option<T> {
+    /// The cells whose middles are so near to a point.
+    pub fn around(&self, x_m: f64, y_m: f64, reach_m: f64) -> impl Iterator<Item = usize> + use<'_> {
         let to_cell = |m: f64, corner_m: f64| ((m - corner_m) / self.resolution_m).floor() as i64;
         let (cx, cy) = (to_cell(x_m, self.corner_m.0), to_cell(y_m, self.corner_m.1));
-        let reach = (NEAR_M / self.resolution_m).ceil() as i64;
-        let around = (-reach..=reach).flat_map(|dy| (-reach..=reach).map(move |dx| (dx, dy)));
-        let mut cells: Vec<(i64, usize)> = around
-            .map(|(dx, dy)| (dx * dx + dy * dy, cx + dx, cy + dy))
-            .filter(|&(_, x, y)| (0..self.width as i64).contains(&x) && (0..self.height as i64).contains(&y))
-            .map(|(far, x, y)| (far, y as usize * self.width + x as usize))
-            .collect();
-        cells.sort_unstable();
+        let reach = (reach_m / self.resolution_m).ceil() as i64;
+        let (width, height) = (self.width as i64, self.height as i64);
+        let all = (-reach..=reach).flat_map(move |dy| (-reach..=reach).map(move |dx| (cx + dx, cy + dy)));
+        let inside = all.filter(move |&(x, y)| (0..width).contains(&x) && (0..height).contains(&y));
+        let cells = inside.map(move |(x, y)| (y * width + x) as usize);
+        cells.filter(move |&cell| {
+            let (x, y) = self.middle(cell);
+            (x - x_m).hypot(y - y_m) <= reach_m
+        })
+    }
+
+    /// What the nearest cell around a point has that has something.
+    pub fn near<T>(&self, x_m: f64, y_m: f64, of: impl Fn(usize) -> Option<T>) -> Option<T> {
+        let far_m = |cell: usize| {
+            let (x, y) = self.middle(cell);
+            (x - x_m).hypot(y - y_m)
+        };
+        let around = self.around(x_m, y_m, NEAR_M).map(|cell| (far_m(cell), cell));
+        let mut cells: Vec<(f64, usize)> = around.collect();
+        cells.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         cells.into_iter().find_map(|(_, cell)| of(cell))
     }
 }

@@ -4,6 +4,7 @@ use super::basins::{Parts, basins};
 use super::clearance::clearance;
 use super::outline::{doubled_area, loops, outline};
 use super::raster::Raster;
+use super::reach::drivable;
 use proptest::prelude::*;
 
 /// A raster of free rectangles: from x, y on, so wide and so high, cells of 0.1 m.
@@ -61,6 +62,18 @@ fn an_outline_goes_around_all_cells_and_what_stands_in_them() {
     assert!((area(&outline.polygon_m) - 20.0).abs() < 1e-9);
     assert_eq!(outline.holes_m.len(), 1);
     assert!((area(&outline.holes_m[0]) + 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn a_robot_drives_through_what_is_wider_than_itself() {
+    // Two rooms at a corridor, one by a door of 0.9 m, the other by one of 0.4 m.
+    let raster =
+        raster(130, 90, &[(2, 12, 120, 20), (25, 32, 9, 3), (85, 32, 4, 3), (10, 35, 40, 30), (60, 35, 40, 30)]);
+    let drivable = drivable(&raster, &clearance(&raster), &[]);
+    let at = |x: usize, y: usize| drivable[y * raster.width + x];
+    assert!(at(60, 20).is_some() && at(80, 50).is_some());
+    assert_eq!((at(60, 20), at(60, 20) == at(80, 50)), (at(30, 50), false));
+    assert_eq!(at(3, 20), None, "there is no room beside a wall");
 }
 
 /// Counter-clockwise.

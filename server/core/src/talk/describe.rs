@@ -291,7 +291,7 @@ fn belief<'a>(phrase: &Phrase, places: &'a [(usize, f64)]) -> LandmarkBelief<'a>
 }
 
 /// "Just", "twenty meters", "the second door".
-fn narrowing(modifiers: &Modifiers, landmark: Option<&Phrase>) -> Narrowing {
+pub(crate) fn narrowing(modifiers: &Modifiers, landmark: Option<&Phrase>) -> Narrowing {
     let nth = landmark.and_then(counted);
     let distance_m = modifiers.distance.map(Distance::metres);
     Narrowing { just: modifiers.just, distance_m, doors: nth.or(modifiers.count) }

@@ -10,7 +10,7 @@
 
 mod accept;
 pub mod claims;
-mod describe;
+pub(crate) mod describe;
 mod doubts;
 mod fold;
 pub mod ledger;

@@ -1,10 +1,12 @@
 //! A place that may be meant, and all that is told of it.
 
 use super::Snapshot;
-use crate::answers::query::Candidate;
-use crate::answers::whereabouts::{Region, SAME_REGION_M};
+use crate::answers::query::{Candidate, Goal};
+use crate::answers::named::Spot;
+use crate::answers::whereabouts::{Region, SAME_PLACE_M};
 use crate::edge::{PlaceId, Vertex};
-use crate::filter::labels::LabelId;
+use crate::effects::TrackState;
+use crate::filter::labels::{LabelId, Source};
 use crate::geometry::Pose2;
 use nalgebra::Matrix3;
 use std::collections::BTreeSet;
@@ -13,16 +15,30 @@ use std::collections::BTreeSet;
 const BECAUSE_MAX: usize = 32;
 
 impl Snapshot {
-    pub(super) fn candidate(&self, label: LabelId, Region { place, p_is, probability }: Region) -> Candidate {
+    pub(super) fn candidate(&self, label: LabelId, region: Region) -> Candidate {
+        let Region { spot, place, p_is, probability } = region;
+        let pose = self.poses[place as usize];
+        let stood = Goal { pose, is_reachable: None };
+        let (id, polygon_m, goal) = match spot {
+            Spot::Place(v) => (PlaceId::from(v), Vec::new(), stood),
+            Spot::Region(r) => {
+                let (rooms, from) = (self.rooms(), self.now.robot.map(|p| (p.x_m, p.y_m)));
+                let from = from.filter(|_| self.now.state != TrackState::Lost);
+                let goal = rooms.goal(r, (pose.x_m, pose.y_m), from).unwrap_or(stood);
+                (rooms.regions[r].id, rooms.regions[r].polygon_m.clone(), goal)
+            }
+        };
         Candidate {
-            place: PlaceId::from(place),
+            place: id,
             label: self.ledger.name(label).to_owned(),
             shown: self.ledger.spelled(self.ledger.name(label)).to_owned(),
             probability,
             p_is,
-            pose: self.poses[place as usize],
+            pose,
             covariance: self.covariance(place),
-            because: self.because(label, place),
+            polygon_m,
+            goal,
+            because: self.because(label, spot),
         }
     }
 
@@ -46,13 +62,24 @@ impl Snapshot {
         sum
     }
 
-    pub(super) fn because(&self, label: LabelId, v: Vertex) -> Vec<String> {
-        let at = self.poses[v as usize];
+    /// Ids of the sentences that speak for a name there.
+    pub(super) fn because(&self, label: LabelId, spot: Spot) -> Vec<String> {
+        let named = self.named();
+        let is_near = |v: Vertex| match spot {
+            Spot::Place(at) => self.poses[v as usize].distance_m(&self.poses[at as usize]) < SAME_PLACE_M,
+            Spot::Region(_) => false,
+        };
         let mut utterances: BTreeSet<u32> = BTreeSet::new();
         for e in self.particles[0].labels.evidence().iter().filter(|e| e.label == label) {
-            if self.poses[e.place as usize].distance_m(&at) < SAME_REGION_M {
+            let outright = !matches!(e.source, Source::Grounded | Source::Carried);
+            if outright && (named.spot(e, &self.ledger) == spot || is_near(e.place)) {
                 utterances.insert(e.utterance);
             }
+        }
+        if let (Spot::Region(r), Some(described)) = (spot, named.described(label, &self.ledger))
+            && described.which.p[r] > described.prior.p[r]
+        {
+            utterances.extend(described.utterances);
         }
         let newest = utterances.len().saturating_sub(BECAUSE_MAX);
         let ids = utterances.into_iter().skip(newest);

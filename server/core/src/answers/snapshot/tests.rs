@@ -1,4 +1,5 @@
 use super::*;
+use crate::answers::named::Spot;
 use crate::config::Config;
 use crate::edge::EdgeKind;
 use crate::filter::labels::{DIRECT, Evidence, Source};
@@ -24,7 +25,7 @@ fn torn(state: TrackState) -> Snapshot {
     let best = Particle { edges: Arc::new(vec![edge]), log_weight: 0.6_f64.ln(), ..Particle::empty() };
     filter.particles = vec![best, other];
     let now = Now { robot: Some(Pose2::default()), state, epoch: 0, rev: 0 };
-    Snapshot { unresolved: 0.25, ..Snapshot::new(&filter, Arc::default(), Vec::new(), now) }
+    Snapshot { unresolved: 0.25, ..Snapshot::new(&filter, Arc::default(), Arc::default(), Vec::new(), now) }
 }
 
 #[test]
@@ -61,8 +62,7 @@ fn where_am_i_asks_for_the_robot_and_nothing_else_does() {
         ("gym", false),
         ("how do I get to the library from here", false),
     ] {
-        let query = Query::Where { text: text.into(), lang: None };
-        assert_eq!(torn(TrackState::Lost).is_of_robot(&query), of_robot, "{text}");
+        assert_eq!(torn(TrackState::Lost).is_of_robot(text, None), of_robot, "{text}");
     }
 }
 
@@ -81,6 +81,6 @@ fn of_what_was_said_a_hundred_times_the_newest_sentences_are_reasons() {
         }
     }
     map.ledger = Arc::new(ledger);
-    let because = map.because(0, 0);
+    let because = map.because(0, Spot::Place(0));
     assert_eq!((because.len(), because[0].as_str(), because[31].as_str()), (32, "u67", "u98"));
 }

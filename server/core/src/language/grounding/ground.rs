@@ -107,6 +107,11 @@ pub fn ground_with(
     Grounding { p, p_elsewhere: elsewhere / z, likelihood_ratio: z, ratios }
 }
 
+/// Density of the figure of a clause at every place, per m²: (15) alone, its factors those of the path driven.
+pub fn densities(readings: &[Reading], places: &[GroundPlace], speaker: usize) -> Vec<f64> {
+    clause_density(&Scales::FITTED, readings, places, speaker).0
+}
+
 fn nothing_said(places: usize) -> Grounding {
     Grounding { p: vec![0.0; places], p_elsewhere: 1.0, likelihood_ratio: 1.0, ratios: vec![1.0; places] }
 }
