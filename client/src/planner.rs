@@ -3,7 +3,7 @@
 use crate::session::{ClientError, ask};
 use std::time::Duration;
 use toponym_proto::Mend;
-use toponym_proto::answer::{Done, GraphReply, GridReply, Info, LabelsReply, Mended, WhereReply};
+use toponym_proto::answer::{Done, GraphReply, GridReply, Info, LabelsReply, Mended, WhatReply, WhereReply};
 use toponym_proto::keys::{Ask, Keys, check_id};
 use toponym_proto::regions::RegionsReply;
 use toponym_proto::selector;
@@ -41,6 +41,26 @@ impl Planner {
     pub async fn where_is_in(&self, name: &str, lang: Option<&str>) -> Result<WhereReply, ClientError> {
         let arguments = selector::encode([("name", name)].into_iter().chain(lang.map(|lang| ("lang", lang))));
         ask(&self.session, &self.keys.ask(&self.map, Ask::Where), &arguments, self.timeout).await
+    }
+
+    /// Where is the nearest of what people call so, or of that kind ("restroom"), by the way there from the robot?
+    ///
+    /// # Errors
+    /// If the robot does not know where it is, the server does not know the language, or no answer comes in time.
+    pub async fn nearest(&self, name: &str, lang: Option<&str>) -> Result<WhereReply, ClientError> {
+        let arguments = selector::encode([("name", name)].into_iter().chain(lang.map(|lang| ("lang", lang))));
+        ask(&self.session, &self.keys.ask(&self.map, Ask::Nearest), &arguments, self.timeout).await
+    }
+
+    /// What is at a point of the map, metres; none: where the robot is?
+    ///
+    /// # Errors
+    /// If the robot is asked for and does not know where it is, or no answer comes in time.
+    pub async fn what(&self, at_m: Option<[f64; 2]>) -> Result<WhatReply, ClientError> {
+        let at_m = at_m.map(|at_m| at_m.map(|m| m.to_string()));
+        let point = at_m.iter().flat_map(|[x, y]| [("x_m", x.as_str()), ("y_m", y.as_str())]);
+        let arguments = selector::encode(point);
+        ask(&self.session, &self.keys.ask(&self.map, Ask::What), &arguments, self.timeout).await
     }
 
     /// All names taught so far.

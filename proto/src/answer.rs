@@ -29,12 +29,13 @@ pub struct MapIdentity {
     pub level: Option<String>,
 }
 
-/// Answer of `ask/where`.
+/// Answer of `ask/where`, and of `ask/nearest`: there `probability` is that it is the nearest that is so, by the way
+/// there.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WhereReply {
     /// [`ANSWER_VERSION`].
     pub v: u32,
-    /// `where`.
+    /// `where` or `nearest`.
     pub query: String,
     /// The name or question as asked.
     pub name: String,
@@ -59,7 +60,7 @@ pub struct WhereReply {
 pub struct Resolved {
     /// The name as the map spells it; none if the question names nothing.
     pub label: Option<String>,
-    /// `exact`, `kind`, `synonym`, `sound`, `unknown`, or another way of finding it.
+    /// `exact`, `kind`, `synonym`, `sound`, `here`, `unknown`, or another way of finding it.
     pub via: String,
     /// Names that may have been meant where this one is unknown.
     #[serde(default)]
@@ -95,8 +96,48 @@ pub struct Candidate {
     pub goal: Option<Goal>,
     /// From the robot to it; none while the robot is lost.
     pub from_robot: Option<FromRobot>,
+    /// Length of the way there from the robot, metres; `ask/nearest` alone tells it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub walk_m: Option<f64>,
     /// Ids of the utterances behind it.
     pub because: Vec<String>,
+}
+
+/// Answer of `ask/what`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WhatReply {
+    /// [`ANSWER_VERSION`].
+    pub v: u32,
+    /// `what`.
+    pub query: String,
+    /// Of which map.
+    pub map: MapIdentity,
+    /// Stamp of the newest message in the answer's map.
+    pub stamp: Stamp,
+    /// The point asked for, or where the robot is: metres, map frame.
+    pub x_m: f64,
+    /// See `x_m`.
+    pub y_m: f64,
+    /// Id of the region in which it lies; none if in none.
+    pub region: Option<u64>,
+    /// What kind of space that is by its shape: `corridor`, `room`, `hall`.
+    pub kind: Option<String>,
+    /// What it may be called, likeliest first.
+    pub names: Vec<Called>,
+    /// Posterior mass of graphs that were dropped.
+    #[serde(default)]
+    pub unresolved: f64,
+}
+
+/// A name that may apply.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Called {
+    /// As the map knows it.
+    pub label: String,
+    /// As a guide spells it.
+    pub shown: String,
+    /// Probability that it applies.
+    pub p: f64,
 }
 
 /// A pose to send a robot to.
@@ -371,6 +412,7 @@ mod tests {
                 polygon_m: vec![],
                 goal: Some(Goal { x_m: 4.0, y_m: -2.0, yaw_rad: 0.0, reachable: Reachable::Unknown }),
                 from_robot: None,
+                walk_m: None,
                 because: vec!["01J".into()],
             }],
         };

@@ -17,6 +17,10 @@ pub const DEFAULT_SITE: &str = "default";
 pub enum Ask {
     /// Where is it?
     Where,
+    /// What is this?
+    What,
+    /// Where is the nearest of its kind?
+    Nearest,
     /// All names.
     Labels,
     /// Places and edges.
@@ -29,12 +33,15 @@ pub enum Ask {
 
 impl Ask {
     /// All there are.
-    pub const ALL: [Self; 5] = [Self::Where, Self::Labels, Self::Graph, Self::Grid, Self::Regions];
+    pub const ALL: [Self; 7] =
+        [Self::Where, Self::What, Self::Nearest, Self::Labels, Self::Graph, Self::Grid, Self::Regions];
 
     /// Last chunk of the key.
     pub fn as_str(self) -> &'static str {
         match self {
             Self::Where => "where",
+            Self::What => "what",
+            Self::Nearest => "nearest",
             Self::Labels => "labels",
             Self::Graph => "graph",
             Self::Grid => "grid",

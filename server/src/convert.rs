@@ -2,20 +2,20 @@
 //! Nothing is judged here: `toponym-proto` has refused what is wrong, the core decides what a
 //! range means.
 
+mod rooms;
+
+pub use self::rooms::{regions_reply, what_reply};
 use nalgebra::Matrix3;
-use std::collections::BTreeMap;
 use toponym_core::answers::query::{self, GraphAnswer, WhereAnswer};
 use toponym_core::edge::EdgeKind;
 use toponym_core::effects::{self, TrackState};
 use toponym_core::event::{self, Event};
-use toponym_core::regions::{self, Shape};
-use toponym_core::{Pose2, Snapshot, geometry};
+use toponym_core::{Pose2, geometry};
 use toponym_proto::answer::{
     ANSWER_VERSION, Candidate, Difference, Edge, FromRobot, Goal, GraphReply, GridReply, Grounded, Heard,
     HeardStatus, LabelEntry, LabelsReply, MapIdentity, Particle, Place, PoseState, Reachable, Resolved,
     WhereReply,
 };
-use toponym_proto::regions::{Doorway, Region, RegionName, RegionsReply};
 use toponym_proto::{Mend, Message, Pose, Stamp};
 
 /// A message as the core takes it. A sentence without `began` counts as said at the clock's zero:
@@ -153,8 +153,14 @@ fn candidate(c: query::Candidate, from: Option<&Pose2>, robot: &str) -> Candidat
             distance_m: from.distance_m(&c.pose),
             bearing_rad: geometry::wrap((y_m - from.y_m).atan2(x_m - from.x_m) - from.yaw_rad),
         }),
+        walk_m: c.walk_m.map(millimetres),
         because: c.because,
     }
+}
+
+/// Answer of `ask/nearest`.
+pub fn nearest_reply(answer: WhereAnswer, map: MapIdentity, stamp: Stamp, robot: &str) -> WhereReply {
+    WhereReply { query: "nearest".into(), ..where_reply(answer, map, stamp, robot) }
 }
 
 fn goal(goal: &query::Goal) -> Goal {
@@ -245,49 +251,6 @@ pub fn grid_reply(grid: query::Grid, map: MapIdentity) -> GridReply {
     }
 }
 
-/// Answer of `ask/regions`, coordinates to the millimetre.
-pub fn regions_reply(snapshot: &Snapshot, map: MapIdentity) -> RegionsReply {
-    let (regions, places) = (&snapshot.rooms().regions, snapshot.places());
-    let names = |vertices: &[u32]| {
-        let mut names: BTreeMap<&str, f64> = BTreeMap::new();
-        for (name, p) in vertices.iter().flat_map(|&v| &places[v as usize].labels) {
-            let most = names.entry(name).or_insert(0.0);
-            *most = most.max(*p);
-        }
-        let mut names: Vec<RegionName> =
-            names.into_iter().map(|(name, p)| RegionName { label: name.to_owned(), p }).collect();
-        names.sort_by(|a, b| b.p.total_cmp(&a.p).then_with(|| a.label.cmp(&b.label)));
-        names
-    };
-    let entry = |r: &regions::Region| Region {
-        id: r.id,
-        kind: match r.shape {
-            Shape::Corridor => "corridor",
-            Shape::Room => "room",
-            Shape::Hall => "hall",
-        }
-        .into(),
-        names: names(&r.places),
-        area_m2: millimetres(r.area_m2),
-        polygon_m: line(&r.polygon_m),
-        holes_m: r.holes_m.iter().map(|hole| line(hole)).collect(),
-        doorways: r
-            .doorways
-            .iter()
-            .map(|d| Doorway {
-                to: regions[d.to].id,
-                x_m: millimetres(d.at_m.0),
-                y_m: millimetres(d.at_m.1),
-                width_m: millimetres(d.width_m),
-            })
-            .collect(),
-        places: r.places.iter().map(|&v| places[v as usize].id).collect(),
-    };
-    let mut all: Vec<Region> = regions.iter().map(entry).collect();
-    all.sort_by_key(|r| r.id);
-    RegionsReply { v: ANSWER_VERSION, query: "regions".into(), map, regions: all }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -344,6 +307,7 @@ mod tests {
             covariance: Matrix3::from_fn(|i, j| (3 * i + j) as f64),
             polygon_m: vec![(0.0, 4.0), (2.0, 4.0), (2.0, 6.0004)],
             goal: query::Goal { pose: Pose2::new(1.5, 5.0, 0.5), is_reachable: Some(false) },
+            walk_m: None,
             because: vec![],
         };
         let answer = WhereAnswer {
@@ -366,9 +330,9 @@ mod tests {
         let reply = where_reply(answer, MapIdentity::default(), Stamp { ns: 1 }, "r07");
         let from = reply.candidates[0].from_robot.as_ref().unwrap();
         assert!((from.distance_m - 3.0).abs() < 1e-12 && from.bearing_rad.abs() < 1e-12);
-        assert_eq!(reply.candidates[0].polygon_m[2], [2.0, 6.0]);
+        assert!((reply.candidates[0].polygon_m[2][1] - 6.0).abs() < 1e-12, "to a millimetre");
         let goal = reply.candidates[0].goal.as_ref().unwrap();
-        assert_eq!((goal.x_m, goal.reachable), (1.5, Reachable::No));
+        assert!((goal.x_m - 1.5).abs() < 1e-12 && goal.reachable == Reachable::No);
         assert_eq!(reply.candidates[0].cov.map(|c| c as u32), [0, 1, 2, 3, 4, 5, 6, 7, 8]);
     }
 }

@@ -270,6 +270,7 @@ mod tests {
             polygon_m: vec![],
             goal: None,
             from_robot: Some(FromRobot { robot: "r".into(), distance_m: 7.2, bearing_rad: 0.5 }),
+            walk_m: None,
             because: vec![],
         };
         let reply = WhereReply {

@@ -3,7 +3,8 @@
 use crate::site::{Folder, Site, drive, recorded, saved_map, say, settings};
 use toponym_core::Mapper;
 use toponym_proto::answer::{
-    Clocks, ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, WhereReply,
+    Clocks, ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, Reachable,
+    WhatReply, WhereReply,
 };
 use toponym_proto::keys::Ask;
 use toponym_proto::regions::RegionsReply;
@@ -41,6 +42,24 @@ async fn a_map_answers() {
     let json = site.ask(&ask(Ask::Where, ""), r#"{"text": "where is the gym"}"#).await.unwrap();
     let question: WhereReply = serde_json::from_value(json).unwrap();
     assert_eq!(question.candidates, reply.candidates);
+
+    // It is the room, and one can go there.
+    let best = &reply.candidates[0];
+    assert!(best.polygon_m.len() >= 4 && best.goal.as_ref().unwrap().reachable == Reachable::Yes, "{best:?}");
+    let json = site.ask(&ask(Ask::What, ""), "").await.unwrap();
+    let here: WhatReply = serde_json::from_value(json).unwrap();
+    assert_eq!((here.names[0].label.as_str(), here.region), ("gym", Some(best.region)));
+    let json = site.ask(&ask(Ask::What, "x_m=900;y_m=0"), "").await.unwrap();
+    let nowhere: WhatReply = serde_json::from_value(json).unwrap();
+    assert_eq!((nowhere.names.len(), nowhere.region), (0, None));
+    let json = site.ask(&ask(Ask::Nearest, "name=gym"), "").await.unwrap();
+    let nearest: WhereReply = serde_json::from_value(json).unwrap();
+    assert!(nearest.candidates[0].walk_m.is_some_and(|m| m < 12.0), "{nearest:?}");
+    for wrong in
+        [ask(Ask::What, "x_m=1"), ask(Ask::What, "x_m=a;y_m=2"), ask(Ask::Where, "text=of%20the%20of")]
+    {
+        assert_eq!(site.ask(&wrong, "").await.unwrap_err().code, ErrorCode::BadArgument, "{wrong}");
+    }
 
     // An unknown place is an answer.
     let json = site.ask(&ask(Ask::Where, "name=swimming%20pool"), "").await.unwrap();
@@ -98,6 +117,10 @@ async fn who_is_lost_is_asked_where_things_are_but_not_how_far() {
     assert_eq!(json["candidates"][0]["from_robot"], serde_json::Value::Null);
     let reply: WhereReply = serde_json::from_value(json).unwrap();
     assert!(reply.candidates[0].x_m > 1.0 && reply.candidates[0].goal.is_some(), "{reply:?}");
+    for of_robot in ["nearest?name=gym", "what"] {
+        let key = site.keys.ask("main", Ask::What).replace("what", of_robot);
+        assert_eq!(site.ask(&key, "").await.unwrap_err().code, ErrorCode::NotLocalised, "{key}");
+    }
     for other in [Ask::Graph, Ask::Labels, Ask::Grid, Ask::Regions] {
         site.ask(&site.keys.ask("main", other), "").await.unwrap();
     }

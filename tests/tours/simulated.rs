@@ -4,10 +4,11 @@ use crate::tour::{Spoken, Tour, outright};
 use crate::truth::{Hypothesis, Named, Path, Piece, Question, Truth};
 use anyhow::Result;
 use toponym_core::Pose2;
+use toponym_core::language::{is_of_kind, misheard, synonyms};
 use toponym_proto::Pose;
 use toponym_sim::STEP_S;
 use toponym_sim::reference::{Seen, Stretch, posterior};
-use toponym_sim::tours::{self, Language, Played, Said, Told};
+use toponym_sim::tours::{self, Asked, Language, Played, Said, Told};
 
 /// Time between two rows of the true path.
 const ROW_S: f64 = 0.1;
@@ -71,7 +72,16 @@ fn hypothesis(h: &tours::Hypothesis) -> Hypothesis {
 fn spoken(played: &Played, language: Language) -> Option<Spoken> {
     let said = played.narration.get(&language)?.clone();
     let asked = played.questions.get(&language).into_iter().flatten();
-    let questions = asked.map(|(text, asked)| Question {
+    // What means the same as a name that was said is no name never said.
+    let names: Vec<&str> = said.iter().filter_map(|s| Some(s.claim.as_ref()?.name.as_str())).collect();
+    let means = |asked: &str, name: &&str| {
+        synonyms(asked, name).max(misheard(asked, name)) > 0.0 || is_of_kind(name, asked)
+    };
+    let is_fair = |text: &str, asked: &Asked| {
+        let name = text.rsplit_once("the ").map_or(text, |t| t.1);
+        asked.told != Told::Never || !names.iter().any(|n| means(name, n))
+    };
+    let questions = asked.filter(|(text, asked)| is_fair(text, asked)).map(|(text, asked)| Question {
         text: text.clone(),
         rooms: asked.rooms.clone(),
         relations: if let Told::Related(relations) = asked.told { relations } else { 0 },

@@ -111,8 +111,11 @@ impl Truth {
             let ids = if known(text) { ids } else { &[] };
             ids.iter().filter_map(|id| self.regions.get(id).cloned()).collect()
         };
-        let question =
-            |(text, ids): (&String, &Vec<String>)| Question { text: text.clone(), rooms: rooms(text, ids), relations: 0 };
+        let question = |(text, ids): (&String, &Vec<String>)| Question {
+            text: text.clone(),
+            rooms: rooms(text, ids),
+            relations: 0,
+        };
         let truly = |s: &&Sentence| self.utterances.contains(s);
         let named = |s: &Sentence| Some(Named { t_s: s.t, name: outright(&s.text)?.to_lowercase() });
         Spoken {

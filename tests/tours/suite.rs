@@ -200,7 +200,7 @@ mod tests {
         assert_eq!(outcomes, run(2));
         assert_eq!(outcomes.iter().map(|o| o.seed).collect::<Vec<_>>(), [1, 2]);
         for outcome in outcomes {
-            assert!(outcome.hypotheses.len() > 1 && outcome.answers.of > 3 && outcome.labels.of > 3);
+            assert!(outcome.hypotheses.len() > 1 && outcome.answers.len() > 3 && outcome.labels.of > 3);
             let mass: f64 = outcome.reference.unwrap().mass[3].iter().sum();
             assert!((mass - 1.0).abs() < 1e-9, "{mass}");
             for graphs in outcome.checkpoints.iter().map(|c| &c.as_ref().unwrap().graphs) {

@@ -34,7 +34,7 @@ pub fn text(s: &Summary) -> String {
     line("top graphs all true", number(s.top_particles_all_true));
     line("trajectory error (m)", spread(s.ate_rmse_m));
     line("names, answers right", format!("{}, {}", rate(&s.label_accuracy), rate(&s.answers_right)));
-    for (way, by) in &s.answers.answers_by {
+    for (way, by) in &s.answers.by_telling {
         let of = format!("{}, mass {}, p_none {}", rate(&by.right), number(by.mass), rate(&by.found));
         line(&format!("  told {way}"), of);
     }
@@ -43,7 +43,8 @@ pub fn text(s: &Summary) -> String {
     for (kind, error) in &s.answers.ece_of {
         line(&format!("  calibration of {kind}"), calibration(Some(error)));
     }
-    let from: Vec<String> = s.answers.right_from.iter().map(|(p, r)| format!("{} from {p}", rate(r))).collect();
+    let from: Vec<String> =
+        s.answers.right_from.iter().map(|(p, r)| format!("{} from {p}", rate(r))).collect();
     line("  best ones right", from.join(", "));
     line("calibration error", calibration(s.calibration.as_ref()));
     line("  of weights below .95", calibration(s.calibration_below_95.as_ref()));

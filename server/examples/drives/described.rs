@@ -23,13 +23,16 @@ use toponym_sim::{Draw, FloorPlan};
 /// What the draws of a drive are for, among the simulator's.
 const DESCRIBED: u64 = 7000;
 /// Rooms that were entered are named outright, so often, where they are not spoken of.
-const NAMED: f64 = 0.67;
+const NAMED: f64 = 0.75;
 /// How sure that is.
 const SURE: f64 = 0.9;
 /// Guides speak of rooms that the tour does not lead to, but rather of the others: so many of the former are kept.
-const NEVER_ENTERED: f64 = 0.25;
+const NEVER_ENTERED: f64 = 0.08;
 /// Statements of a kind about one room in one map.
 const PER_KIND: usize = 2;
+/// Of statements about rooms that are not entered so soon after, so many are kept.
+const SOON_S: f64 = 60.0;
+const NOT_SOON: f64 = 0.5;
 /// Points at which it is counted in which room a region lies.
 const STEP_M: f64 = 0.3;
 /// When maps are looked at, as shares of the drive.
@@ -59,7 +62,11 @@ pub fn report(plans: &Path, seeds: std::ops::Range<u64>, out: Option<&Path>) {
     let examples: Vec<Example> = seeds.par_iter().flat_map(|&seed| of_drive(&plans, &halves, seed)).collect();
     let learned: Vec<&Example> = examples.iter().filter(|e| !e.held).collect();
     let unseen = examples.iter().filter(|e| e.meant.is_empty()).count();
-    println!("{} statements, {} of them to learn from; {unseen} of rooms not seen yet", examples.len(), learned.len());
+    println!(
+        "{} statements, {} of them to learn from; {unseen} of rooms not seen yet",
+        examples.len(),
+        learned.len()
+    );
     let said: Vec<&Example> = learned.iter().copied().filter(|e| e.kind != Kind::Anywhere).collect();
     let all = fit(&said, &[0.0; FEATURES], RIDGE_OF_ALL);
     let weights: Vec<[f64; FEATURES]> = Kind::ALL
@@ -69,7 +76,10 @@ pub fn report(plans: &Path, seeds: std::ops::Range<u64>, out: Option<&Path>) {
             if kind == Kind::Anywhere { fit(&of, &[0.0; FEATURES], RIDGE) } else { fit(&of, &all, RIDGE) }
         })
         .collect();
-    println!("{:<10} {:>6} {:>6} {:>6} {:>6} {:>6}   held: the same", "kind", "n", "right", "mass", "-ln", "ece");
+    println!(
+        "{:<10} {:>6} {:>6} {:>6} {:>6} {:>6}   held: the same",
+        "kind", "n", "right", "mass", "-ln", "ece"
+    );
     for (k, kind) in Kind::ALL.into_iter().enumerate() {
         let of = |held: bool| told(examples.iter().filter(|e| e.kind == kind && e.held == held), &weights[k]);
         println!("{:<10} {}   {}", format!("{kind:?}"), of(false), of(true));
@@ -81,7 +91,8 @@ pub fn report(plans: &Path, seeds: std::ops::Range<u64>, out: Option<&Path>) {
 
 /// Plans, and whether they are of the buildings that are not learned from: every other one, by the folders' names.
 fn halves(plans: &Path) -> BTreeMap<PathBuf, bool> {
-    let folder = |file: &PathBuf| file.strip_prefix(plans).ok()?.components().next().map(|c| c.as_os_str().to_owned());
+    let folder =
+        |file: &PathBuf| file.strip_prefix(plans).ok()?.components().next().map(|c| c.as_os_str().to_owned());
     let files = buildings(plans);
     let folders: BTreeSet<_> = files.iter().filter_map(folder).collect();
     let index = |file: &PathBuf| folders.iter().position(|f| Some(f) == folder(file).as_ref()).unwrap_or(0);
@@ -135,7 +146,8 @@ fn fit(examples: &[&Example], from: &[f64; FEATURES], ridge: f64) -> [f64; FEATU
             let g = (gradient[k] - ridge * (w[k] - from[k])) / n;
             m[k] = 0.9 * m[k] + 0.1 * g;
             v[k] = 0.999 * v[k] + 0.001 * g * g;
-            let (mean, square) = (m[k] / (1.0 - 0.9_f64.powi(step as i32)), v[k] / (1.0 - 0.999_f64.powi(step as i32)));
+            let (mean, square) =
+                (m[k] / (1.0 - 0.9_f64.powi(step as i32)), v[k] / (1.0 - 0.999_f64.powi(step as i32)));
             w[k] += RATE * mean / (square.sqrt() + 1e-8);
         }
     }
@@ -161,7 +173,8 @@ fn told<'a>(examples: impl Iterator<Item = &'a Example>, weights: &[f64; FEATURE
         masses.push(mass);
         loss -= mass.max(1e-3).ln();
         let none = [(which.p_none, e.meant.is_empty())];
-        let each = which.p.iter().enumerate().map(|(r, &p)| (p, e.meant.contains(&r))).filter(|c| c.0 >= 0.02);
+        let each =
+            which.p.iter().enumerate().map(|(r, &p)| (p, e.meant.contains(&r))).filter(|c| c.0 >= 0.02);
         for (p, so) in each.chain(none) {
             let bin = &mut bins[((p * 10.0) as usize).min(9)];
             *bin = (bin.0 + 1, bin.1 + p, bin.2 + usize::from(so));
@@ -180,7 +193,9 @@ fn of_drive(plans: &[PathBuf], halves: &BTreeMap<PathBuf, bool>, seed: u64) -> V
     let mut draw = Draw::new(seed, DESCRIBED);
     let file = &plans[draw.below(plans.len())];
     let tour = FloorPlan::read(file).ok().and_then(|plan| planned(&plan, seed).ok());
-    let Some((tour, played)) = tour.and_then(|tour| Some((tour.clone(), tour.play().ok()?))) else { return Vec::new() };
+    let Some((tour, played)) = tour.and_then(|tour| Some((tour.clone(), tour.play().ok()?))) else {
+        return Vec::new();
+    };
     let held = halves.get(file).copied().unwrap_or(true);
     let is_entered = |room: usize| {
         let area = &tour.scenario.world.rooms[room].area;
@@ -240,9 +255,8 @@ fn of_map(
     };
     let rows: Vec<Row> = placed.iter().filter_map(row).collect();
     let rooms = in_rooms(&snapshot, tour, &alignment(&rows));
-    let regions_of = |room: usize| -> Vec<usize> {
-        (0..rooms.len()).filter(|&r| rooms[r] == Some(room)).collect()
-    };
+    let regions_of =
+        |room: usize| -> Vec<usize> { (0..rooms.len()).filter(|&r| rooms[r] == Some(room)).collect() };
     // Who speaks: the place and the pose at that time.
     let speaker = |at_s: f64| {
         let (_, id, from_body) = placed.iter().take_while(|p| p.0 as f64 * 1e-9 <= at_s).last()?;
@@ -268,6 +282,11 @@ fn of_map(
             if *count >= PER_KIND || marks.len() < s.landmarks.len() {
                 continue;
             }
+            // Guides speak of where they lead to.
+            let entered_s = entered_s(tour, figure, s.at_s);
+            if entered_s.is_none_or(|t_s| t_s - s.at_s > SOON_S) && !draw.chance(NOT_SOON) {
+                continue;
+            }
             *count += 1;
             // Landmarks bear their names.
             let is_named = |room: &Option<usize>| {
@@ -278,7 +297,7 @@ fn of_map(
                 .iter()
                 .map(|room| if is_named(room) && room.is_some_and(is_room) { SURE } else { 0.0 })
                 .collect();
-            let scene = Scene { rooms: snapshot.rooms(), places: &places, other: &other, way: false };
+            let scene = Scene::new(snapshot.rooms(), &places, &other, false);
             let way = s.landmarks.iter().any(|&k| !is_room(k));
             let clause = Clause {
                 relation: locate.relation,
@@ -301,6 +320,16 @@ fn of_map(
     examples
 }
 
+/// When a room is first entered after some time.
+fn entered_s(tour: &Tour, room: usize, from_s: f64) -> Option<f64> {
+    let area = &tour.scenario.world.rooms[room].area;
+    let seconds = (0..=(tour.drive.duration_s() - from_s).max(0.0) as usize).map(|k| from_s + k as f64);
+    seconds.into_iter().find(|&t_s| {
+        let p = tour.drive.at(t_s);
+        area.contains([p.x_m, p.y_m], 0.0)
+    })
+}
+
 fn largest(snapshot: &Snapshot, regions: &[usize]) -> Option<usize> {
     let area_m2 = |r: &usize| snapshot.rooms().regions[*r].area_m2;
     regions.iter().copied().max_by(|a, b| area_m2(a).total_cmp(&area_m2(b)))
@@ -320,7 +349,11 @@ fn located(how: &str) -> Option<Locate> {
 }
 
 /// The room in which each region lies, by most of its floor.
-fn in_rooms(snapshot: &Snapshot, tour: &Tour, to_truth: &impl Fn(f64, f64) -> (f64, f64)) -> Vec<Option<usize>> {
+fn in_rooms(
+    snapshot: &Snapshot,
+    tour: &Tour,
+    to_truth: &impl Fn(f64, f64) -> (f64, f64),
+) -> Vec<Option<usize>> {
     let world = &tour.scenario.world;
     let of = |region: &toponym_core::regions::Region| {
         let area = Area { corners: region.polygon_m.iter().map(|p| [p.0, p.1]).collect() };

@@ -3,8 +3,8 @@
 
 use std::collections::BTreeMap;
 use std::sync::{Arc, Mutex, OnceLock};
-use toponym_core::answers::query::WhereAnswer;
 use toponym_core::Snapshot;
+use toponym_core::answers::query::WhereAnswer;
 
 use super::board::lock;
 

@@ -15,6 +15,7 @@
 
 mod answered;
 pub mod args;
+mod arguments;
 pub mod board;
 pub mod door;
 mod intake;

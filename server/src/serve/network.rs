@@ -108,8 +108,10 @@ fn in_order(endpoint: &str) -> String {
 /// Replies go as their queries came, and those may ask to be waited for, in the queue of all else. So queries are changed on
 /// their way in: long answers wait for those who read slowly, in a queue of their own; short ones do not wait.
 fn replies() -> Value {
-    let short = ["map/*/ask/where", "map/*/ask/labels", "robot/*/out/*", "info", "time"];
-    let short: Vec<String> = short.iter().map(|key| format!("toponym/v1/*/{key}")).collect();
+    let short =
+        ["where", "what", "nearest", "labels"].map(|ask| format!("toponym/v1/*/map/*/ask/{ask}")).into_iter();
+    let told = ["robot/*/out/*", "info", "time"].map(|key| format!("toponym/v1/*/{key}"));
+    let short: Vec<String> = short.chain(told).collect();
     json!([
         {
             "id": "long", "messages": ["query"], "flows": ["ingress"], "key_exprs": ["**"],

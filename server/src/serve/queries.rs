@@ -6,14 +6,13 @@ use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use toponym_core::effects::TrackState;
-use toponym_core::language::Speech;
-use toponym_core::{Answer, Query, Snapshot};
+use toponym_core::{Answer, Query};
 use toponym_proto::answer::{ANSWER_VERSION, Clocks, Done, ErrorCode, Mended, Problem, RobotState};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
 use toponym_proto::{Limits, Mend, Message, Stamp};
 
+use super::arguments::{asked, check_localised, check_robot, known, point, resolution_m, take, understood};
 use super::board::{Board, MapView, lock};
 use super::door::Arrival;
 use super::scribe::Work;
@@ -22,8 +21,6 @@ use crate::convert;
 
 /// How long a command waits for a map that is busy.
 const COMMAND_WAIT: Duration = Duration::from_secs(60);
-/// Cells of a grid, metres.
-const RESOLUTION_M: std::ops::RangeInclusive<f64> = 0.01..=1.0;
 const RESOLUTION_DEFAULT_M: f64 = 0.05;
 
 /// All keys there are something to ask on, for queries with wildcards.
@@ -88,7 +85,10 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
             let map = map(board, id)?;
             match Ask::ALL.into_iter().find(|ask| ask.as_str() == *what) {
                 Some(ask) => answer_about(&map, ask, arguments),
-                None => Err(no_such_query(key).hint("ask one of where, labels, graph, grid, regions")),
+                None => {
+                    Err(no_such_query(key)
+                        .hint("ask one of where, what, nearest, labels, graph, grid, regions"))
+                }
             }
         }
         ["map", id, "out", "graph"] => {
@@ -122,21 +122,6 @@ fn map(board: &Board, id: &str) -> Result<Arc<MapView>, Problem> {
     })
 }
 
-/// Takes the arguments that a query knows; any other is an error, for it would be ignored.
-fn take<const N: usize>(mut arguments: Arguments, known: [&str; N]) -> Result<[Option<String>; N], Problem> {
-    let taken = known.map(|name| arguments.remove(name));
-    match arguments.into_keys().next() {
-        None => Ok(taken),
-        Some(name) => Err(Problem::new(ErrorCode::BadArgument, format!("{name}: no such argument"))
-            .field(name)
-            .hint(if known.is_empty() {
-                "it takes none".into()
-            } else {
-                format!("it takes: {}", known.join(", "))
-            })),
-    }
-}
-
 fn json<T: Serialize>(value: &T) -> Result<Vec<u8>, Problem> {
     serde_json::to_vec(value).map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))
 }
@@ -150,8 +135,23 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
             check_robot(map, robot.as_deref())?;
             let (text, lang) = (asked(name, text)?, known(lang)?);
             check_localised(&snapshot, (&text, lang.as_deref()), robot.is_some())?;
-            let answer = map.answered.where_is(&snapshot, &text, lang.as_deref());
+            let answer = understood(map.answered.where_is(&snapshot, &text, lang.as_deref()))?;
             return json(&convert::where_reply(answer, identity, map.stamp(), &map.robot));
+        }
+        Ask::Nearest => {
+            let [name, text, lang, robot] = take(arguments, ["name", "text", "lang", "robot"])?;
+            check_robot(map, robot.as_deref())?;
+            let (text, lang) = (asked(name, text)?, known(lang)?);
+            // It counts from the robot.
+            check_localised(&snapshot, (&text, lang.as_deref()), true)?;
+            let answer = understood(snapshot.nearest(&text, lang.as_deref()))?;
+            return json(&convert::nearest_reply(answer, identity, map.stamp(), &map.robot));
+        }
+        Ask::What => {
+            let [x_m, y_m, robot] = take(arguments, ["x_m", "y_m", "robot"])?;
+            check_robot(map, robot.as_deref())?;
+            let (x_m, y_m) = point(&snapshot, x_m, y_m)?;
+            return json(&convert::what_reply(snapshot.what(x_m, y_m), identity, map.stamp()));
         }
         Ask::Labels | Ask::Graph => {
             let [] = take(arguments, [])?;
@@ -177,68 +177,6 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
 /// The graph of a map, as asked and as published.
 pub fn graph(map: &MapView) -> Result<Vec<u8>, Problem> {
     answer_about(map, Ask::Graph, Arguments::new())
-}
-
-/// The name or the question.
-fn asked(name: Option<String>, text: Option<String>) -> Result<String, Problem> {
-    let ((Some(text), None) | (None, Some(text))) = (name, text) else {
-        return Err(Problem::new(ErrorCode::BadArgument, "give either name or text")
-            .field("name")
-            .hint("?name=lecture%20hall or ?text=where%20is%20the%20lecture%20hall"));
-    };
-    if text.trim().is_empty() {
-        return Err(Problem::new(ErrorCode::BadArgument, "name is empty").field("name"));
-    }
-    Ok(text)
-}
-
-/// A language, if this server reads it.
-fn known(lang: Option<String>) -> Result<Option<String>, Problem> {
-    if Speech::knows(lang.as_deref()) {
-        return Ok(lang);
-    }
-    let message = format!("lang is {:?}; this server reads {}", lang.unwrap_or_default(), Speech::known());
-    Err(Problem::new(ErrorCode::BadArgument, message).field("lang").hint("?name=K%C3%BCche;lang=de"))
-}
-
-fn check_robot(map: &MapView, robot: Option<&str>) -> Result<(), Problem> {
-    match robot {
-        Some(robot) if robot != map.robot => {
-            let message = format!("robot {robot:?} is not on map {:?}", map.id);
-            let hint = format!("its robot is {}", map.robot);
-            Err(Problem::new(ErrorCode::NoSuchRobot, message).field("robot").hint(hint))
-        }
-        _ => Ok(()),
-    }
-}
-
-/// What counts from the robot can't be told of one that is lost; all else stands in the map's frame.
-fn check_localised(
-    snapshot: &Snapshot,
-    (text, lang): (&str, Option<&str>),
-    of_robot: bool,
-) -> Result<(), Problem> {
-    // To read a question takes longer than to answer it: only where it matters.
-    if snapshot.state() != TrackState::Lost {
-        return Ok(());
-    }
-    if of_robot || snapshot.is_of_robot(text, lang) {
-        let message = "the robot doesn't know where it is";
-        let hint = "ask without robot= for where things are in the map";
-        return Err(Problem::new(ErrorCode::NotLocalised, message).field("robot").hint(hint));
-    }
-    Ok(())
-}
-
-fn resolution_m(text: &str) -> Result<f64, Problem> {
-    match text.parse() {
-        Ok(value) if RESOLUTION_M.contains(&value) => Ok(value),
-        _ => {
-            let range = format!("{} to {}", RESOLUTION_M.start(), RESOLUTION_M.end());
-            let message = format!("resolution_m is {text}, must be a number from {range}");
-            Err(Problem::new(ErrorCode::BadArgument, message).field("resolution_m"))
-        }
-    }
 }
 
 fn info(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {

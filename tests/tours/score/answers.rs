@@ -25,9 +25,12 @@ pub struct Answered {
     pub is_in: bool,
     /// Probability of the candidates in right rooms; of what was never said, that it is nowhere.
     pub mass: f64,
-    /// Each candidate's probability that it is meant, and whether it is in a right room.
+    /// Probabilities that the candidates are meant, and whether they are in a right room; those that are count as one, for
+    /// where several rooms bear a name any of them is right.
     pub probability: Vec<Claim>,
-    /// The same of its name's applying there.
+    /// Of the best candidate.
+    pub best: Option<Claim>,
+    /// Of each candidate the probability that its name applies there.
     pub p_is: Vec<Claim>,
     /// That it is nowhere.
     pub p_none: Claim,
@@ -55,13 +58,18 @@ impl Answered {
         let wrong: f64 = probability.iter().filter(|c| !c.1).map(|c| c.0 * c.0).sum();
         let mass = if is_named { in_rooms } else { answer.p_none };
         let none = if is_named { answer.p_none.powi(2) } else { 0.0 };
-        let best_m = answer.candidates.first().map(away_m);
+        let (best_m, best_p) = (answer.candidates.first().map(away_m), probability.first().copied());
         Self {
             relations: is_named.then_some(question.relations),
             is_right: if is_named { best_m.is_some_and(|m| m <= NEAR_M) } else { answer.p_none > 0.5 },
             is_in: if is_named { best_m.is_some_and(|m| m <= IN_M) } else { answer.p_none > 0.5 },
             mass,
-            probability,
+            probability: probability
+                .into_iter()
+                .filter(|c| !c.1)
+                .chain((in_rooms > 0.0).then_some((in_rooms, true)))
+                .collect(),
+            best: best_p,
             p_is: claims(|c| c.p_is),
             p_none: (answer.p_none, !is_named),
             brier: (1.0 - mass).powi(2) + wrong + none,
@@ -134,12 +142,14 @@ mod tests {
     #[test]
     fn mass_is_that_of_right_rooms_and_what_is_wrong_costs() {
         let question = Question { text: "gym".into(), rooms: vec![room()], relations: 2 };
-        let candidates = vec![candidate([1.0, 1.0], 0.5), candidate([9.0, 1.0], 0.2), candidate([3.0, 1.0], 0.1)];
+        let candidates =
+            vec![candidate([1.0, 1.0], 0.5), candidate([9.0, 1.0], 0.2), candidate([3.0, 1.0], 0.1)];
         let answer = Answer { question: "gym".into(), p_none: 0.2, candidates };
         let a = &answered(&[answer], &[question], &Pose2::default())[0];
         assert_eq!((a.relations, a.is_in, a.p_none), (Some(2), true, (0.2, false)));
         assert!((a.mass - 0.6).abs() < 1e-12 && (a.nll() + 0.6_f64.ln()).abs() < 1e-12);
         assert!((a.brier - (0.16 + 0.04 + 0.04)).abs() < 1e-12);
-        assert_eq!(a.probability[1], (0.2, false));
+        assert_eq!((a.best, a.probability[0]), (Some((0.5, true)), (0.2, false)));
+        assert!((a.probability[1].0 - 0.6).abs() < 1e-12 && a.probability[1].1);
     }
 }

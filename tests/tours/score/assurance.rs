@@ -15,7 +15,8 @@ const LIKELIER: f64 = 0.5;
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Answers {
     /// By how the name was told: `outright`, `one relation`, `two relations`, `never`.
-    pub answers_by: BTreeMap<&'static str, By>,
+    #[serde(rename = "answers_by")]
+    pub by_telling: BTreeMap<&'static str, By>,
     /// −ln of the mass that answers give what is right, mean by seed.
     pub nll: Option<Spread>,
     /// Squared error of the probabilities, mean by seed.
@@ -62,11 +63,11 @@ impl Answers {
         let ece_of: BTreeMap<_, _> = kinds.into_iter().filter_map(|(kind, c)| Some((kind, c?))).collect();
         let from = [("0.5", 0.5), ("0.8", 0.8), ("0.9", 0.9), ("0.95", 0.95)];
         let right_from = |least: f64| {
-            let best = |a: &Answered| a.probability.first().copied().filter(|c| c.0 >= least);
+            let best = |a: &Answered| a.best.filter(|c| c.0 >= least);
             Rate::of(outcomes, |o| Share::count(o.answers.iter().filter_map(best).map(|c| c.1)))
         };
         Self {
-            answers_by: ways.into_iter().map(|(way, of)| (way, By::of(&of))).collect(),
+            by_telling: ways.into_iter().map(|(way, of)| (way, By::of(&of))).collect(),
             nll: Spread::of(&by_seed(Answered::nll), Bad::High),
             brier: Spread::of(&by_seed(|a| a.brier), Bad::High),
             ece: ece_of.get("probability").map(|c| c.ece),
@@ -125,7 +126,7 @@ mod tests {
         let mut outcome = Outcome::new(1, &Truth::default(), &Mapped::default(), None);
         outcome.answers = answered(&told, &questions, &Pose2::default());
         let all = Answers::of(&[outcome]);
-        let right = |way: &str| (all.answers_by[way].right.right, all.answers_by[way].right.of);
+        let right = |way: &str| (all.by_telling[way].right.right, all.by_telling[way].right.of);
         assert_eq!((right("outright"), right("one relation"), right("never")), ((1, 1), (0, 1), (1, 1)));
         assert_eq!(all.right_from["0.9"].share, Some(1.0));
         assert_eq!(all.right_from["0.5"].share, Some(0.5));
@@ -133,6 +134,6 @@ mod tests {
         assert!((all.ece.unwrap() - wanted).abs() < 1e-9, "{all:?}");
         let mean = |of: &dyn Fn(f64) -> f64| (of(0.95) + of(1e-3) + of(0.9)) / 3.0;
         assert!((all.nll.unwrap().median - mean(&|m| -m.ln())).abs() < 1e-9);
-        assert!(all.answers_by["never"].found.share == Some(1.0));
+        assert!(all.by_telling["never"].found.share == Some(1.0));
     }
 }

@@ -1,7 +1,7 @@
 //! Figures of a tour over its seeds: what is printed, and what `--json` writes.
 
-use super::spread::{Bad, Claim, median};
 use super::answers::right;
+use super::spread::{Bad, Claim, median};
 use super::{Answers, Calibration, Moment, Outcome, Share, Spread};
 use serde::Serialize;
 use std::collections::BTreeMap;

@@ -1,11 +1,11 @@
-//! `toponym where` and `toponym labels`.
+//! `toponym where`, `nearest`, `what`, `labels`, `rooms`.
 
 use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::time::Duration;
 use toponym::{Connection, Planner};
-use toponym_proto::answer::{Candidate, LabelsReply, WhereReply};
+use toponym_proto::answer::{Candidate, LabelsReply, WhatReply, WhereReply};
 use toponym_proto::regions::{Region, RegionsReply};
 
 /// Less likely names of rooms are not told in text.
@@ -22,7 +22,7 @@ Examples:
   toponym where Küche --lang de
   toponym where 'where is the kitchen?' --map floor2 --timeout 1
 
-Bearings are from the robot's nose, left is positive. Exit code 1 if the name is not known.")]
+Bearings are from the robot's nose, left is positive. Exit code 1 if it is rather nowhere in the map.")]
 pub struct WhereArgs {
     /// A name, or a whole question.
     name: String,
@@ -52,7 +52,50 @@ pub async fn find(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, F
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.where_is_in(&args.name, args.lang.as_deref()).await?;
     print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
-    Ok(if reply.candidates.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
+    Ok(exit_code(&reply))
+}
+
+pub async fn nearest(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
+    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
+    let reply = planner.nearest(&args.name, args.lang.as_deref()).await?;
+    print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
+    Ok(exit_code(&reply))
+}
+
+/// Whether something is rather somewhere than nowhere.
+fn exit_code(reply: &WhereReply) -> u8 {
+    let likeliest = reply.candidates.iter().map(|c| c.probability).fold(0.0, f64::max);
+    if likeliest > 0.0 && likeliest >= reply.p_none { exit::FOUND } else { exit::NOT_KNOWN }
+}
+
+/// Arguments of `what`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  toponym what
+  toponym what --at 3.5,-2
+
+Exit code 1 if nobody told a name of it.")]
+pub struct WhatArgs {
+    /// A point of the map, metres; without, where the robot is.
+    #[arg(long, value_name = "X,Y", value_parser = point, allow_hyphen_values = true)]
+    at: Option<[f64; 2]>,
+    #[command(flatten)]
+    asked: AskedArgs,
+}
+
+fn point(text: &str) -> Result<[f64; 2], String> {
+    let both = text.split_once(',').and_then(|(x, y)| Some([x.trim().parse().ok()?, y.trim().parse().ok()?]));
+    both.ok_or_else(|| "give two numbers, as 3.5,-2".to_owned())
+}
+
+pub async fn what(to: &Connection, site: &str, args: &WhatArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
+    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
+    let reply = planner.what(args.at).await?;
+    print(&if args.asked.json { json(&reply)? } else { what_text(&reply) })?;
+    Ok(if reply.names.is_empty() { exit::NOT_KNOWN } else { exit::FOUND })
 }
 
 pub async fn labels(to: &Connection, site: &str, asked: &AskedArgs) -> Result<u8, Failure> {
@@ -101,6 +144,14 @@ fn where_text(reply: &WhereReply) -> String {
     text
 }
 
+fn what_text(reply: &WhatReply) -> String {
+    let names: Vec<String> = reply.names.iter().map(|n| format!("{} ({:.2})", n.shown, n.p)).collect();
+    let names =
+        if names.is_empty() { "nobody told what this is called".to_owned() } else { names.join(", ") };
+    let space = reply.region.zip(reply.kind.as_ref()).map(|(id, kind)| format!(", a {kind} (region {id})"));
+    format!("x {:.2} m, y {:.2} m{}: {names}\n", reply.x_m, reply.y_m, space.unwrap_or_default())
+}
+
 /// Its name as a guide spells it.
 fn shown(c: &Candidate) -> &str {
     if c.shown.is_empty() { &c.label } else { &c.shown }
@@ -110,7 +161,8 @@ fn candidate_text(c: &Candidate) -> String {
     let from_robot = c.from_robot.as_ref().map_or(String::new(), |from| {
         format!("{:.1} m away, {}, ", from.distance_m, bearing_text(from.bearing_rad))
     });
-    format!("{from_robot}probability {:.2} (x {:.2} m, y {:.2} m)", c.probability, c.x_m, c.y_m)
+    let walk = c.walk_m.map_or(String::new(), |m| format!("{m:.1} m to go, "));
+    format!("{from_robot}{walk}probability {:.2} (x {:.2} m, y {:.2} m)", c.probability, c.x_m, c.y_m)
 }
 
 fn bearing_text(bearing_rad: f64) -> String {
@@ -201,6 +253,7 @@ mod tests {
                 distance_m: 8.25,
                 bearing_rad,
             }),
+            walk_m: None,
             because: Vec::new(),
         }
     }

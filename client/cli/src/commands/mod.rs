@@ -45,6 +45,8 @@ Try, with `toponym-server serve` running in another terminal:
   toponym replay tour/sim.clf --narration tour/narration.jsonl --speed 20
   toponym labels                                 what was it told?
   toponym where kitchen                          how far, which way, how sure?
+  toponym what                                   what is the room called where the robot is?
+  toponym nearest restroom                       which one is nearest by the way there?
   toponym rooms                                  how large, what called, where do they lead?
   toponym say 'this is the workshop'             teach it another name
 
@@ -108,6 +110,10 @@ enum Command {
     Where(find::WhereArgs),
     /// List all names taught so far.
     Labels(find::AskedArgs),
+    /// What is this, where the robot is or at a point of the map?
+    What(find::WhatArgs),
+    /// Where is the nearest of its kind, by the way there from the robot?
+    Nearest(find::WhereArgs),
     /// List the rooms: how large, what they are called, where they lead.
     Rooms(find::AskedArgs),
     /// Take a sentence back.
@@ -178,6 +184,8 @@ async fn done(args: &Args) -> Result<u8, Failure> {
         Command::Say(say) => talk::say(&to, &args.site, say).await,
         Command::Where(asked) => find::find(&to, &args.site, asked).await,
         Command::Labels(asked) => find::labels(&to, &args.site, asked).await,
+        Command::What(asked) => find::what(&to, &args.site, asked).await,
+        Command::Nearest(asked) => find::nearest(&to, &args.site, asked).await,
         Command::Rooms(asked) => find::rooms(&to, &args.site, asked).await,
         Command::Undo(undo) => mend::undo(&to, &args.site, undo).await,
         Command::Rename(rename) => mend::rename(&to, &args.site, rename).await,

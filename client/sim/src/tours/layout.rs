@@ -109,7 +109,12 @@ impl<'a> Layout<'a> {
         let mut all = Vec::new();
         let beside: Vec<usize> = others().filter(|&k| self.are_next(room, k)).collect();
         for (k, &a) in beside.iter().enumerate() {
-            all.extend(beside[k + 1..].iter().filter(|&&b| self.is_between(room, a, b)).map(|&b| Lies::Between(a, b)));
+            all.extend(
+                beside[k + 1..]
+                    .iter()
+                    .filter(|&&b| self.is_between(room, a, b))
+                    .map(|&b| Lies::Between(a, b)),
+            );
         }
         all.extend(beside.iter().map(|&k| Lies::NextTo(k)));
         all.extend(others().filter(|&k| self.are_across(room, k)).map(Lies::AcrossFrom));

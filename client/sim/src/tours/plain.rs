@@ -10,8 +10,8 @@ use crate::geom::{Rect, distance_m};
 use crate::random::Draw;
 use crate::storey::Storey;
 use crate::world::{Plan, RoomKind, World};
-use std::collections::BTreeSet;
 use crate::{Fault, FloorPlan, OfficeStyle, Scenario, SimError};
+use std::collections::BTreeSet;
 use toponym_proto::Pose;
 
 /// Rooms on a tour of an office, and how many of them are visited once more in the end: whatever went wrong on
@@ -79,10 +79,8 @@ fn near_each_other(world: &World, mut left: Vec<usize>, draw: &mut Draw) -> Vec<
     while tour.len() < PLAN_STOPS && !left.is_empty() {
         let from = world.rooms[tour[draw.below(tour.len())]].area.centre();
         let far_m = |k: &usize| distance_m(world.rooms[left[*k]].area.centre(), from);
-        let next = match draw.chance(NEXT_BY) {
-            true => (0..left.len()).min_by(|a, b| far_m(a).total_cmp(&far_m(b))).unwrap_or_default(),
-            false => draw.below(left.len()),
-        };
+        let nearest = || (0..left.len()).min_by(|a, b| far_m(a).total_cmp(&far_m(b))).unwrap_or_default();
+        let next = if draw.chance(NEXT_BY) { nearest() } else { draw.below(left.len()) };
         tour.push(left.swap_remove(next));
     }
     tour
@@ -99,9 +97,12 @@ fn renamed(mut world: World, tour: &[usize], draw: &mut Draw) -> (World, Vec<Str
             used.insert(name);
             continue;
         }
-        let name = std::iter::from_fn(|| Some(fresh.next())).take(64).find(|n| !used.contains(*n)).unwrap_or_default();
+        let name = std::iter::from_fn(|| Some(fresh.next()))
+            .take(64)
+            .find(|n| !used.contains(*n))
+            .unwrap_or_default();
         used.insert(name.to_owned());
-        world.rooms[room].name = name.to_owned();
+        name.clone_into(&mut world.rooms[room].name);
     }
     let mut more = Vec::new();
     for (k, room) in world.rooms.iter_mut().enumerate() {

@@ -44,14 +44,15 @@ pub(super) fn related(tour: &Tour, stays: &[Visit], thoughts: &mut Vec<Thought>,
             lies.retain(|l| !l.landmarks().any(|k| lie.landmarks().any(|o| o == k)));
             chosen.push(lie);
         }
-        let told = told(tour, stays, thoughts, (&layout, room, &chosen), draw);
+        let told = told(tour, stays, thoughts, (&layout, room, &chosen, wanted), draw);
         if told.is_empty() {
             continue;
         }
         landmarks.extend(chosen.iter().flat_map(|l| l.landmarks()));
         outright.retain(|&k| k != room);
         thoughts.retain(|t| t.room != room);
-        let lies = |(at_s, words, relations)| Thought { at_s, visit: 0, room, form: Form::Lies(words, relations) };
+        let lies =
+            |(at_s, words, relations)| Thought { at_s, visit: 0, room, form: Form::Lies(words, relations) };
         thoughts.extend(told.into_iter().map(lies));
     }
 }
@@ -61,7 +62,7 @@ fn told(
     tour: &Tour,
     stays: &[Visit],
     thoughts: &[Thought],
-    (layout, room, chosen): (&Layout, usize, &[Lies]),
+    (layout, room, chosen, wanted): (&Layout, usize, &[Lies], usize),
     draw: &mut Draw,
 ) -> Vec<Told> {
     let world = &tour.scenario.world;
@@ -89,8 +90,9 @@ fn told(
     } else {
         chosen.iter().filter_map(|&lies| say(&[lies], draw)).collect()
     };
-    // "Down the hallway", from the hallway: where nothing else is to be said, and now and then besides.
-    if told.is_empty() || (chosen.len() == 1 && draw.chance(0.3)) {
+    // "Down the hallway", from the hallway: where there is not as much else to say, and now and then instead.
+    let instead = wanted == 1 && draw.chance(0.3);
+    if chosen.len() < wanted || instead {
         let ahead = stays.iter().find_map(|stay| {
             let corridor = &world.rooms[stay.room];
             let at_s = stay.from_s + PAUSE_S;
@@ -102,7 +104,8 @@ fn told(
             fits.then(|| (at_s, format!("down the {}", corridor.name), 1))
         });
         if let Some(ahead) = ahead {
-            told = vec![ahead];
+            told.retain(|_| !instead);
+            told.push(ahead);
         }
     }
     told

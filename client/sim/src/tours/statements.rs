@@ -45,7 +45,12 @@ pub fn statements(tour: &Tour) -> Vec<Statement> {
             let landmarks: Vec<usize> = lies.landmarks().collect();
             let from = stays.iter().filter(|s| landmarks.contains(&s.room)).map(|s| s.from_s + PAUSE_S);
             let how = lies.pattern().to_owned();
-            all.extend(from.map(|at_s| Statement { at_s, figure, how: how.clone(), landmarks: landmarks.clone() }));
+            all.extend(from.map(|at_s| Statement {
+                at_s,
+                figure,
+                how: how.clone(),
+                landmarks: landmarks.clone(),
+            }));
         }
         let corridors = stays.iter().filter(|s| !is_room(&s.room) && s.from_s + PAUSE_S < s.to_s);
         all.extend(corridors.flat_map(|stay| from_corridor(tour, &layout, figure, (stay, &entered))));
@@ -63,7 +68,8 @@ fn from_corridor(
 ) -> Vec<Statement> {
     let at_s = stay.from_s + PAUSE_S;
     let here = tour.drive.at(at_s);
-    let (corridor, said) = (stay.room, |how: &str, landmarks| Statement { at_s, figure, how: how.into(), landmarks });
+    let (corridor, said) =
+        (stay.room, |how: &str, landmarks| Statement { at_s, figure, how: how.into(), landmarks });
     let mut all = Vec::new();
     if layout.is_down(figure, corridor, &here) {
         all.push(said("down the {0}", vec![corridor]));
@@ -88,9 +94,9 @@ fn from_corridor(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::FloorPlan;
     use crate::storey::tests::ROW;
     use crate::tours::planned;
-    use crate::FloorPlan;
     use std::path::Path;
 
     #[test]

@@ -6,6 +6,8 @@ use crate::talk::ledger::Ledger;
 
 /// P(one of them is meant) where a kind is asked for that nobody named by itself: "the archive" for the old archive.
 const OF_KIND: f64 = 0.8;
+/// Who asks for any restroom takes what is so likely one.
+const SYNONYM_MIN: f64 = 0.5;
 /// Names offered in place of an unknown one.
 const SUGGESTED: usize = 3;
 /// Letters that may differ in these.
@@ -56,6 +58,16 @@ pub(crate) fn meaning(
     Meaning { suggestions: like(asked, ledger, &known), ..of(via, 0.0, Vec::new()) }
 }
 
+/// Known names that are one asked for, of its kind, or mean the same.
+pub(crate) fn alike(asked: &str, ledger: &Ledger, known: &[LabelId]) -> Vec<LabelId> {
+    let exact = ledger.label(asked).or_else(|| ledger.spelled_so(asked));
+    let is_alike = |&id: &LabelId| {
+        let name = ledger.name(id);
+        Some(id) == exact || is_of_kind(name, asked) || synonyms(asked, name) >= SYNONYM_MIN
+    };
+    known.iter().copied().filter(is_alike).collect()
+}
+
 /// Names that look like one: by letters, or of the same kind.
 fn like(asked: &str, ledger: &Ledger, known: &[LabelId]) -> Vec<LabelId> {
     let unnumbered = |name: &str| name.split(' ').rfind(|w| !is_number(w) && w.len() > 1).map(str::to_owned);
@@ -97,6 +109,8 @@ mod tests {
         ] {
             assert_eq!((asked(name).via, asked(name).labels), (via, labels), "{name}");
         }
+        assert_eq!(alike("lecture hall", &ledger, &known), [1, 2]);
+        assert_eq!(alike("foyer", &ledger, &known), [3]);
         assert_eq!(asked("kitschen").suggestions, [5]);
         assert_eq!(asked("lecture hall four").suggestions, [2, 1]);
         assert_eq!(meaning(&Name::new("lobby").unwrap(), &ledger, &|id| id == 0, &|| vec![0]).via, "exact");

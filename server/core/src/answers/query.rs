@@ -2,8 +2,8 @@
 
 use crate::edge::PlaceId;
 use crate::geometry::Pose2;
-pub use crate::regions::Goal;
 pub use crate::regions::occupancy::Grid;
+pub use crate::regions::{Goal, Shape};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
 
@@ -88,8 +88,27 @@ pub struct Candidate {
     /// Where to send a robot: free floor with room for it, looking in; a place that lies in no region is one where a
     /// robot stood.
     pub goal: Goal,
+    /// Length of the way there from the robot over known free space, where that was asked for and there is one, metres.
+    pub walk_m: Option<f64>,
     /// Ids of the utterances it rests on.
     pub because: Vec<String>,
+}
+
+/// What is at a point of the map.
+#[derive(Clone, Debug, PartialEq)]
+pub struct WhatAnswer {
+    /// The point in the best graph's map.
+    pub x_m: f64,
+    /// See `x_m`.
+    pub y_m: f64,
+    /// Id of the region in which it lies.
+    pub region: Option<PlaceId>,
+    /// What kind of space that is.
+    pub shape: Option<Shape>,
+    /// Names as guides spell them and as the map does, with the probability that each applies; likeliest first.
+    pub names: Vec<(String, String, f64)>,
+    /// Posterior mass of graphs that were dropped.
+    pub unresolved: f64,
 }
 
 /// A name and where it was given.

@@ -1,10 +1,10 @@
 //! The posterior at one moment, immutable: what questions are answered from, over all particles.
 
 use crate::answers::differences::differences;
+use crate::answers::named::Named;
 use crate::answers::query::{
     Answer, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query,
 };
-use crate::answers::named::Named;
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
 use crate::event::StampNs;
@@ -26,7 +26,7 @@ use std::sync::{Arc, OnceLock};
 
 /// Names told of a place.
 const NAMES_MAX: usize = 5;
-/// Less probable names and candidates are noise.
+/// Less probable names are noise.
 const PROBABILITY_MIN: f64 = 0.02;
 
 /// Places are called by a name in what graphs differ about, if it likely applies.
@@ -102,6 +102,16 @@ impl Snapshot {
     /// Whether to believe that pose.
     pub fn state(&self) -> TrackState {
         self.now.state
+    }
+
+    /// Posterior mass of graphs that were dropped.
+    pub fn unresolved(&self) -> f64 {
+        self.unresolved
+    }
+
+    /// What was said.
+    pub(crate) fn ledger(&self) -> &Ledger {
+        &self.ledger
     }
 
     /// Answers a question; never fails: not knowing is an answer.

@@ -61,7 +61,11 @@ fn here(map: &Snapshot) -> String {
         return lost;
     }
     let Some(robot) = map.robot() else { return "I have seen nothing yet.".to_owned() };
-    match map.called_around(&robot, HERE_M, None).first() {
+    let names = map.what(robot.x_m, robot.y_m).names;
+    let likeliest = names.first().map(|(_, name, p)| (name, p));
+    // Where the room has no name, something near may have one.
+    let near = map.called_around(&robot, HERE_M, None);
+    match likeliest.or(near.first().map(|(name, p)| (name, p))) {
         Some((name, p)) if *p >= SURE => format!("This is {}.", map.spoken(name)),
         Some((name, p)) if *p >= THOUGHT => format!("I think this is {}.", map.spoken(name)),
         Some((name, _)) => format!("This may be {}.", map.spoken(name)),

@@ -1,9 +1,9 @@
 //! Where a name applies, over the whole posterior: each particle by its own map, joined by the rooms of the best one.
 //!
 //! ```text
-//! told_i(c)      = P(name was rightly given to c)                     c: rooms that are one in map i count once
-//! κ_i            = 1 − Π_c (1 − told_i(c))                            something outright is right
-//! P_i(c)         ∝ κ_i told_i(c)/Σ told_i · r(c) + (1 − κ_i) q(c)     q: what descriptions say, r = q / prior
+//! told_i(c)      = α / (max(α, 1) + δ + η ρ)       α: said of c; ρ: other names said of it; rooms that are one in map i count once
+//! κ_i            = 1 − μ Π_c (1 − told_i(c))                        what was not rightly said here is so elsewhere
+//! P_i(c)         ∝ κ_i o(c)/Σ o · r(c) + (1 − κ_i) q(c)             o: odds of told_i; q: descriptions, r = q / prior
 //! P_i(none)      ∝ (1 − κ_i) q(none)
 //! probability(c) = Σ_i w_i P_i(c),   p_none = Σ_i w_i P_i(none)       Σ_c + p_none = 1
 //! p_is(c)        = Σ_i w_i (1 − (1 − told_i(c)) (1 − (1 − κ_i) q(c)))
@@ -12,14 +12,14 @@
 //! An utterance counts once, however many near places it is evidence of, and what was carried over an edge not at all:
 //! places that an edge joins lie near one another.
 
-use crate::answers::named::{Described, Named, Spot};
+use crate::answers::named::{Described, Named, Spot, given};
 use crate::edge::Vertex;
 use crate::filter::labels::{Evidence, LabelId, Source};
 use crate::filter::naming::Tally;
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
 use crate::talk::ledger::Ledger;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Places nearer than this that lie in no room and bear one name are one.
 pub const SAME_PLACE_M: f64 = 6.0;
@@ -29,8 +29,13 @@ const SAME_ROOM_M: f64 = 2.0;
 const JOINED_M: f64 = 3.0;
 /// Spots looked at, those of which most is said.
 const SPOTS_MAX: usize = 64;
+/// μ: of names that were given to the wrong room, so many are in no other room seen (from the tours told of at
+/// [`given`]).
+const NOWHERE: f64 = 0.3;
+/// No odds are better: what is said twice may be of two rooms.
+const ODDS_MAX: f64 = 20.0;
 /// No name is so well known that a description can't be of another place.
-const KNOWN_MAX: f64 = 0.95;
+const KNOWN_MAX: f64 = 0.97;
 /// Of something that was named outright, a description is so often loose or false.
 const LOOSE: f64 = 0.3;
 /// No description moves a name that was given further.
@@ -39,8 +44,10 @@ const RATIO_MAX: f64 = 20.0;
 /// A spot that may bear the name.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Region {
-    /// A room, or a place that lies in none.
+    /// A room, or a spot.
     pub spot: Spot,
+    /// Index of the region in which it lies.
+    pub room: Option<usize>,
     /// The place that stands for it.
     pub place: Vertex,
     /// P(name applies).
@@ -82,12 +89,16 @@ pub fn whereabouts(known: &Known, label: LabelId, p_min: f64) -> Whereabouts {
     let mut spots = spots(known, label);
     let said = spots.len();
     if let Some(Described { which, .. }) = &described {
-        let likely = (0..which.p.len()).filter(|&r| which.p[r] >= p_min).map(Spot::Region);
-        let new: Vec<Spot> = likely.filter(|s| !spots.iter().any(|(spot, _)| spot == s)).collect();
-        spots.extend(new.into_iter().map(|spot| (spot, known.named.anchor(spot, None))));
+        let is_said = |r: usize| spots.iter().any(|s| known.named.region(s.0) == Some(r));
+        let likely = (0..which.p.len()).filter(|&r| which.p[r] >= p_min && !is_said(r)).map(Spot::Region);
+        let new: Vec<(Spot, Vertex)> = likely.map(|spot| (spot, known.named.anchor(spot, None))).collect();
+        spots.extend(new);
     }
     let mut found = Whereabouts::default();
-    let region = |&(spot, place)| Region { spot, place, p_is: 0.0, probability: 0.0 };
+    let region = |&(spot, place): &(Spot, Vertex)| {
+        let room = known.named.region(spot);
+        Region { spot, room, place, p_is: 0.0, probability: 0.0 }
+    };
     found.regions = spots.iter().map(region).collect();
     for particle in known.particles {
         Map::new(known, particle, &spots[..said], label).share_out(described.as_ref(), &mut found);
@@ -130,8 +141,8 @@ struct Map {
     weight: f64,
     /// The cluster of each spot.
     cluster: Vec<usize>,
-    /// What was said of each cluster.
-    tallies: Vec<Tally>,
+    /// P(name was rightly given) of each cluster.
+    told: Vec<f64>,
 }
 
 impl Map {
@@ -154,20 +165,23 @@ impl Map {
         for ((_, of), (says, denies)) in said {
             tallies[of].add(Tally { said: says, denied: denies }, 1.0);
         }
-        Self { weight: particle.weight(), cluster, tallies }
+        let told = |k: usize| given(tallies[k], known.named.rivals(spots[k].0, label, known.ledger));
+        Self { weight: particle.weight(), told: (0..spots.len()).map(told).collect(), cluster }
     }
 
     /// Adds this particle's share to all spots and to none.
     fn share_out(&self, described: Option<&Described>, found: &mut Whereabouts) {
         let said = self.cluster.len();
         let is_first = |k: usize| k >= said || self.cluster[k] == k;
-        let told = |k: usize| self.tallies[self.cluster[k]].told();
+        let told = |k: usize| self.told[self.cluster[k]];
+        let odds = |k: usize| (told(k) / (1.0 - told(k)).max(1e-9)).min(ODDS_MAX);
         let firsts = || (0..said).filter(|&k| is_first(k));
-        let sum: f64 = firsts().map(told).sum();
+        let sum: f64 = firsts().map(odds).sum();
         let unknown: f64 = firsts().map(|k| 1.0 - told(k)).product();
+        let unknown = if sum > 0.0 { NOWHERE * unknown } else { 1.0 };
         let known = if described.is_some() { (1.0 - unknown).min(KNOWN_MAX) } else { 1.0 - unknown };
-        let q = |r: &Region| match (r.spot, described) {
-            (Spot::Region(region), Some(d)) => (d.which.p[region], d.prior.p[region]),
+        let q = |r: &Region| match (r.room, described) {
+            (Some(room), Some(d)) => (d.which.p[room], d.prior.p[room]),
             _ => (0.0, 0.0),
         };
         let ratio = |r: &Region| match q(r) {
@@ -176,7 +190,7 @@ impl Map {
             _ => LOOSE,
         };
         let of_spot = |k: usize, r: &Region| {
-            let outright = if k < said && sum > 0.0 { known * told(k) / sum * ratio(r) } else { 0.0 };
+            let outright = if k < said && sum > 0.0 { known * odds(k) / sum * ratio(r) } else { 0.0 };
             outright + if k < said { 0.0 } else { (1.0 - known) * q(r).0 }
         };
         let p: Vec<f64> = found
@@ -187,7 +201,8 @@ impl Map {
             .collect();
         // A room that bears the name, and one too unlikely to be told, are none of the others.
         let described_none = described.map_or(1.0, |d| {
-            1.0 - found.regions.iter().skip(said).map(|r| q(r).0).sum::<f64>() - said_by(d, &found.regions[..said])
+            1.0 - found.regions.iter().skip(said).map(|r| q(r).0).sum::<f64>()
+                - said_by(d, &found.regions[..said])
         });
         let none = (1.0 - known) * described_none.max(0.0);
         let all = p.iter().sum::<f64>() + none;
@@ -204,11 +219,8 @@ impl Map {
 
 /// What descriptions give the spots that bear the name.
 fn said_by(described: &Described, spots: &[Region]) -> f64 {
-    let of = |r: &Region| match r.spot {
-        Spot::Region(region) => described.which.p[region],
-        Spot::Place(_) => 0.0,
-    };
-    spots.iter().map(of).sum()
+    let rooms: BTreeSet<usize> = spots.iter().filter_map(|r| r.room).collect();
+    rooms.into_iter().map(|room| described.which.p[room]).sum()
 }
 
 /// By spot, the first that it is one with in a particle's map.
@@ -231,6 +243,7 @@ fn clusters(known: &Known, particle: &Particle, spots: &[(Spot, Vertex)]) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::answers::named::{FALSE_ODDS, READ_MAX};
     use crate::filter::labels::DIRECT;
     use proptest::prelude::*;
 
@@ -265,9 +278,11 @@ mod tests {
         let carried = Evidence::new(0, 0, 1, 0.5, Source::Carried);
         let one = found(&[(1.0, &[0.0, 1.0])], &[direct(0, 0), carried]);
         assert_eq!(one.regions.len(), 1);
-        assert!((one.regions[0].p_is - 0.9).abs() < 1e-9 && (one.p_none - 0.1).abs() < 1e-9);
+        let told = 1.0 / (1.0 / READ_MAX + FALSE_ODDS) / READ_MAX;
+        assert!((one.regions[0].p_is - told).abs() < 1e-9, "{one:?}");
+        assert!((one.p_none - NOWHERE * (1.0 - told)).abs() < 1e-9);
         let two = found(&[(1.0, &[0.0, 1.0])], &[direct(0, 0), carried, direct(1, 0)]);
-        assert!(two.regions[0].p_is < 0.96, "{two:?}");
+        assert!(two.regions[0].p_is > told && two.regions[0].p_is < 1.0, "{two:?}");
     }
 
     #[test]
@@ -277,7 +292,8 @@ mod tests {
         let two = found(&maps, &[direct(0, 0), direct(1, 1)]);
         let [a, b] = &two.regions[..] else { panic!("{two:?}") };
         assert!(a.p_is > 0.9 && b.p_is > 0.9, "{two:?}");
-        let none = 0.6 * 0.01 + 0.4 * (1.0 / 9.0) / (1.0 / 9.0 + 2.0);
+        let not = |said: f64| FALSE_ODDS / (said / READ_MAX + FALSE_ODDS);
+        let none = NOWHERE * (0.6 * not(1.0) * not(1.0) + 0.4 * not(2.0));
         assert!((two.p_none - none).abs() < 1e-9, "{two:?}");
         assert!((a.probability - b.probability - 0.4 * (1.0 - none)).abs() < 0.02, "{two:?}");
         // The best map has them as one, the other apart: that is a region, too.

@@ -120,7 +120,13 @@ impl Rooms {
         for part in (0..parts.cells.len()).filter(|&part| index[part].is_some()) {
             let oldest = places[within[part][0] as usize].1.id;
             let doorways = doorways(&raster, &clearance, &parts.saddles, &index, part as u32);
-            regions.push(region(&raster, &parts, part, (oldest, std::mem::take(&mut within[part])), doorways));
+            regions.push(region(
+                &raster,
+                &parts,
+                part,
+                (oldest, std::mem::take(&mut within[part])),
+                doorways,
+            ));
         }
         let least = (UNENTERED_MIN_M2 / raster.resolution_m.powi(2)) as usize;
         let beyond = |from: u32, to: u32, cell: usize| {
@@ -137,6 +143,12 @@ impl Rooms {
         let drivable = reach::drivable(&raster, &clearance, places);
         let floor = Floor { raster, clearance, of: parts.of, cells, drivable };
         Self { regions, unentered, floor: Some(floor) }
+    }
+
+    /// Regions drawn by hand, without their cells.
+    #[cfg(test)]
+    pub(crate) fn drawn(regions: Vec<Region>) -> Self {
+        Self { regions, ..Self::default() }
     }
 
     /// The region in which a point of the map lies, or that is next to it.

@@ -5,6 +5,8 @@ use super::{Floor, Rooms};
 use crate::geometry::Pose2;
 use crate::graph::Place;
 use serde::{Deserialize, Serialize};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
 use std::sync::Arc;
 
 /// A robot is no wider than this from its middle.
@@ -13,6 +15,9 @@ pub const FOOTPRINT_M: f64 = 0.3;
 const SPARE_M: f64 = 0.1;
 /// Where it drove it can drive again, however near the walls.
 const DRIVEN_M: f64 = 0.1;
+/// A step to a cell beside, and to one at a corner.
+const STRAIGHT: u32 = 70;
+const ASLANT: u32 = 99;
 /// Places further apart were not driven between as the crow flies.
 const STRIDE_MAX_M: f64 = 2.0;
 
@@ -26,7 +31,11 @@ pub struct Goal {
 }
 
 /// By cell, the number of the part of the floor that a robot can drive about in; none: it can't stand there.
-pub(super) fn drivable(raster: &Raster, clearance: &[f32], places: &[(Pose2, Arc<Place>)]) -> Vec<Option<u32>> {
+pub(super) fn drivable(
+    raster: &Raster,
+    clearance: &[f32],
+    places: &[(Pose2, Arc<Place>)],
+) -> Vec<Option<u32>> {
     let mut open: Vec<bool> = clearance.iter().map(|&m| f64::from(m) >= FOOTPRINT_M).collect();
     for pair in places.windows(2).filter(|p| p[0].1.segment == p[1].1.segment) {
         let (a, b) = (pair[0].0, pair[1].0);
@@ -81,6 +90,41 @@ impl Rooms {
         let yaw_rad = door.map_or(0.0, |(x, y)| (at.1.1 - y).atan2(at.1.0 - x));
         let is_reachable = here.map(|here| floor.drivable[at.0] == Some(here));
         Some(Goal { pose: Pose2::new(at.1.0, at.1.1, yaw_rad), is_reachable })
+    }
+}
+
+impl Rooms {
+    /// Lengths of the ways from a point to others over known free space, by Dijkstra on the cells; none where there is
+    /// no way.
+    pub fn walks_m(&self, from: (f64, f64), to: &[(f64, f64)]) -> Vec<Option<f64>> {
+        let Some(floor) = &self.floor else { return vec![None; to.len()] };
+        let cell = |&(x, y): &(f64, f64)| floor.raster.near(x, y, |cell| floor.drivable[cell].map(|_| cell));
+        let goals: Vec<Option<usize>> = to.iter().map(cell).collect();
+        let Some(start) = cell(&from) else { return vec![None; to.len()] };
+        let mut left =
+            goals.iter().flatten().filter(|&&g| floor.drivable[g] == floor.drivable[start]).count();
+        let mut far: Vec<u32> = vec![u32::MAX; floor.drivable.len()];
+        let mut next = BinaryHeap::from([Reverse((0, start))]);
+        far[start] = 0;
+        while let Some(Reverse((way, cell))) = next.pop().filter(|_| left > 0) {
+            if way > far[cell] {
+                continue;
+            }
+            left -= goals.iter().filter(|g| **g == Some(cell)).count();
+            for beside in
+                floor.raster.beside(cell, true).filter(|&c| floor.drivable[c] == floor.drivable[start])
+            {
+                let straight = cell.abs_diff(beside) == 1 || cell.abs_diff(beside) == floor.raster.width;
+                let there = way + if straight { STRAIGHT } else { ASLANT };
+                if there < far[beside] {
+                    far[beside] = there;
+                    next.push(Reverse((there, beside)));
+                }
+            }
+        }
+        let metres = |far: u32| f64::from(far) / f64::from(STRAIGHT) * floor.raster.resolution_m;
+        let reached = |g: &Option<usize>| g.map(|g| far[g]).filter(|&far| far < u32::MAX).map(metres);
+        goals.iter().map(reached).collect()
     }
 }
 

@@ -67,8 +67,11 @@ fn an_outline_goes_around_all_cells_and_what_stands_in_them() {
 #[test]
 fn a_robot_drives_through_what_is_wider_than_itself() {
     // Two rooms at a corridor, one by a door of 0.9 m, the other by one of 0.4 m.
-    let raster =
-        raster(130, 90, &[(2, 12, 120, 20), (25, 32, 9, 3), (85, 32, 4, 3), (10, 35, 40, 30), (60, 35, 40, 30)]);
+    let raster = raster(
+        130,
+        90,
+        &[(2, 12, 120, 20), (25, 32, 9, 3), (85, 32, 4, 3), (10, 35, 40, 30), (60, 35, 40, 30)],
+    );
     let drivable = drivable(&raster, &clearance(&raster), &[]);
     let at = |x: usize, y: usize| drivable[y * raster.width + x];
     assert!(at(60, 20).is_some() && at(80, 50).is_some());

@@ -7,9 +7,9 @@ use crate::language::{GroundPlace, LandmarkBelief, Narrowing, Reading, Relation,
 use crate::regions::{Region, Rooms, Shape};
 
 /// Of a region, and behind them those of "not in the map yet".
-pub const FEATURES: usize = 24;
+pub const FEATURES: usize = 26;
 /// Where the latter begin.
-const NONE: usize = 19;
+const NONE: usize = 21;
 /// Outlines nearer than this have a wall in common.
 const WALL_M: f64 = 0.8;
 /// Between points of an outline that are looked at.
@@ -70,19 +70,22 @@ impl Clause {
 }
 
 /// A map in which something is looked for.
-#[derive(Clone, Copy)]
 pub struct Scene<'a> {
-    /// Its regions.
-    pub rooms: &'a Rooms,
-    /// Its places.
-    pub places: &'a [GroundPlace],
-    /// By region, the probability that it bears another name.
-    pub other: &'a [f64],
-    /// What is looked for is one that one goes along.
-    pub way: bool,
+    rooms: &'a Rooms,
+    places: &'a [GroundPlace],
+    other: &'a [f64],
+    way: bool,
+    /// Regions that the robot went into and came out of by the way it had come: rooms, mostly.
+    visited: Vec<bool>,
 }
 
-impl Scene<'_> {
+impl<'a> Scene<'a> {
+    /// Of regions and places; by region, the probability that it bears another name; and whether what is looked for is
+    /// one that one goes along.
+    pub fn new(rooms: &'a Rooms, places: &'a [GroundPlace], other: &'a [f64], way: bool) -> Self {
+        Self { rooms, places, other, way, visited: visited(rooms, places.len()) }
+    }
+
     /// All that may be meant.
     pub fn alternatives(&self, clause: &Clause) -> Alternatives {
         let regions = &self.rooms.regions;
@@ -91,7 +94,8 @@ impl Scene<'_> {
             ([], Some(speaker)) => self.rooms.at(speaker.pose.x_m, speaker.pose.y_m).into_iter().collect(),
             (given, _) => given.to_vec(),
         };
-        let may_contain = matches!(clause.relation, Relation::At | Relation::In | Relation::On | Relation::Contains);
+        let may_contain =
+            matches!(clause.relation, Relation::At | Relation::In | Relation::On | Relation::Contains);
         let of = |r: usize| {
             let is_landmark = landmarks.contains(&r) && clause.speaker.is_some() && !may_contain;
             (!is_landmark).then(|| self.of_region(clause, &landmarks, r, &density))
@@ -135,6 +139,8 @@ impl Scene<'_> {
         f[9] = f64::from(region.shape == Shape::Corridor && !self.way);
         f[10] = self.other[r];
         f[11] = (region.area_m2 / 12.0).ln().clamp(-2.0, 2.0);
+        f[19] = (region.places.len() as f64).ln();
+        f[20] = f64::from(self.visited[r]);
         let Some(speaker) = &clause.speaker else { return f };
         let at = region.places.iter().map(|&v| density[v as usize]);
         let (most, sum) = at.fold((0.0_f64, 0.0), |(most, sum), d| (most.max(d), sum + d));
@@ -191,7 +197,9 @@ impl Scene<'_> {
         let of = |l: &usize| &self.rooms.regions[*l];
         let by_landmark = |at: (f64, f64)| {
             let near = |door: &(f64, f64)| (door.0 - at.0).hypot(door.1 - at.1) < OPENING_M;
-            landmarks.iter().any(|l| of(l).doorways.iter().map(|d| d.at_m).any(|d| near(&d)) || near(&of(l).middle_m))
+            landmarks
+                .iter()
+                .any(|l| of(l).doorways.iter().map(|d| d.at_m).any(|d| near(&d)) || near(&of(l).middle_m))
         };
         f[NONE + 2] = openings(&by_landmark);
         let (x, y) = (speaker.pose.x_m, speaker.pose.y_m);
@@ -204,6 +212,21 @@ impl Scene<'_> {
         f[NONE + 4] = (1.0 + free).ln();
         f
     }
+}
+
+/// By region, whether the path once went in from where it went out to.
+fn visited(rooms: &Rooms, places: usize) -> Vec<bool> {
+    let mut region_of = vec![None; places];
+    for (r, region) in rooms.regions.iter().enumerate() {
+        region.places.iter().for_each(|&v| region_of[v as usize] = Some(r));
+    }
+    let mut visited = vec![false; rooms.regions.len()];
+    let mut runs: Vec<usize> = region_of.into_iter().flatten().collect();
+    runs.dedup();
+    for run in runs.windows(3).filter(|run| run[0] == run[2]) {
+        visited[run[1]] = true;
+    }
+    visited
 }
 
 /// How one region lies to another.

@@ -6,6 +6,9 @@
 //! ```
 
 pub mod features;
+pub mod sense;
+#[cfg(test)]
+pub(crate) mod tests;
 mod weights;
 
 use self::features::{Alternatives, Clause, FEATURES, Scene};
@@ -91,7 +94,8 @@ impl Which {
 
     /// By weights.
     pub fn softmax(alternatives: &Alternatives, weights: &[f64; FEATURES]) -> Self {
-        let score = |features: &[f64; FEATURES]| features.iter().zip(weights).map(|(f, w)| f * w).sum::<f64>();
+        let score =
+            |features: &[f64; FEATURES]| features.iter().zip(weights).map(|(f, w)| f * w).sum::<f64>();
         let scores: Vec<Option<f64>> = alternatives.regions.iter().map(|r| r.as_ref().map(score)).collect();
         let none = score(&alternatives.none);
         let most = scores.iter().flatten().copied().fold(none, f64::max);
@@ -103,14 +107,14 @@ impl Which {
 
     /// What two that tell of the same say together, each but for `doubt` that it says nothing; `prior` is what both
     /// begin with.
+    #[must_use]
     pub fn and(&self, other: &Self, prior: &Self, doubt: f64) -> Self {
         let says = |p: f64, prior: f64| {
             let ratio = if prior > 0.0 { p / prior } else { 0.0 };
             (1.0 - doubt) * ratio + doubt
         };
         let weigh = |p: f64, of: f64, prior: f64| p * says(of, prior);
-        let p: Vec<f64> =
-            (0..self.p.len()).map(|r| weigh(self.p[r], other.p[r], prior.p[r])).collect();
+        let p: Vec<f64> = (0..self.p.len()).map(|r| weigh(self.p[r], other.p[r], prior.p[r])).collect();
         Self { p, p_none: weigh(self.p_none, other.p_none, prior.p_none) }.normalised()
     }
 

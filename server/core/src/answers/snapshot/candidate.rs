@@ -1,8 +1,8 @@
 //! A place that may be meant, and all that is told of it.
 
 use super::Snapshot;
-use crate::answers::query::{Candidate, Goal};
 use crate::answers::named::Spot;
+use crate::answers::query::{Candidate, Goal};
 use crate::answers::whereabouts::{Region, SAME_PLACE_M};
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
@@ -15,13 +15,13 @@ use std::collections::BTreeSet;
 const BECAUSE_MAX: usize = 32;
 
 impl Snapshot {
-    pub(super) fn candidate(&self, label: LabelId, region: Region) -> Candidate {
-        let Region { spot, place, p_is, probability } = region;
+    pub(crate) fn candidate(&self, label: LabelId, region: Region) -> Candidate {
+        let Region { spot, room, place, p_is, probability } = region;
         let pose = self.poses[place as usize];
         let stood = Goal { pose, is_reachable: None };
-        let (id, polygon_m, goal) = match spot {
-            Spot::Place(v) => (PlaceId::from(v), Vec::new(), stood),
-            Spot::Region(r) => {
+        let (id, polygon_m, goal) = match room {
+            None => (PlaceId::from(place), Vec::new(), stood),
+            Some(r) => {
                 let (rooms, from) = (self.rooms(), self.now.robot.map(|p| (p.x_m, p.y_m)));
                 let from = from.filter(|_| self.now.state != TrackState::Lost);
                 let goal = rooms.goal(r, (pose.x_m, pose.y_m), from).unwrap_or(stood);
@@ -38,6 +38,7 @@ impl Snapshot {
             covariance: self.covariance(place),
             polygon_m,
             goal,
+            walk_m: None,
             because: self.because(label, spot),
         }
     }
