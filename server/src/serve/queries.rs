@@ -135,7 +135,8 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
             check_robot(map, robot.as_deref())?;
             let (text, lang) = (asked(name, text)?, known(lang)?);
             check_localised(&snapshot, (&text, lang.as_deref()), robot.is_some())?;
-            let answer = understood(map.answered.where_is(&snapshot, &text, lang.as_deref()))?;
+            let (from, answer) = map.answered.where_is(&snapshot, &text, lang.as_deref());
+            let (answer, identity) = (understood(answer)?, map.identity(&from));
             return json(&convert::where_reply(answer, identity, map.stamp(), &map.robot));
         }
         Ask::Nearest => {
