@@ -5,6 +5,8 @@ use crate::stream::{Pose, Stamp};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+pub use crate::regions::{Called, LabelEntry, LabelsReply, WhatReply};
+
 pub use crate::feedback::{
     Ack, Clocks, Counts, Done, Grounded, Heard, HeardStatus, Info, Jump, Machine, MapWork, Mended, PoseOut,
     PoseState, RobotState,
@@ -103,43 +105,6 @@ pub struct Candidate {
     pub because: Vec<String>,
 }
 
-/// Answer of `ask/what`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct WhatReply {
-    /// [`ANSWER_VERSION`].
-    pub v: u32,
-    /// `what`.
-    pub query: String,
-    /// Of which map.
-    pub map: MapIdentity,
-    /// Stamp of the newest message in the answer's map.
-    pub stamp: Stamp,
-    /// The point asked for, or where the robot is: metres, map frame.
-    pub x_m: f64,
-    /// See `x_m`.
-    pub y_m: f64,
-    /// Id of the region in which it lies; none if in none.
-    pub region: Option<u64>,
-    /// What kind of space that is by its shape: `corridor`, `room`, `hall`.
-    pub kind: Option<String>,
-    /// What it may be called, likeliest first.
-    pub names: Vec<Called>,
-    /// Posterior mass of graphs that were dropped.
-    #[serde(default)]
-    pub unresolved: f64,
-}
-
-/// A name that may apply.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Called {
-    /// As the map knows it.
-    pub label: String,
-    /// As a guide spells it.
-    pub shown: String,
-    /// Probability that it applies.
-    pub p: f64,
-}
-
 /// A pose to send a robot to.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Goal {
@@ -174,33 +139,6 @@ pub struct FromRobot {
     pub distance_m: f64,
     /// Radians from straight ahead, counter-clockwise, (−π, π].
     pub bearing_rad: f64,
-}
-
-/// Answer of `ask/labels`.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LabelsReply {
-    /// [`ANSWER_VERSION`].
-    pub v: u32,
-    /// `labels`.
-    pub query: String,
-    /// Of which map.
-    pub map: MapIdentity,
-    /// All names taught.
-    pub labels: Vec<LabelEntry>,
-}
-
-/// A name.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LabelEntry {
-    /// The name.
-    pub label: String,
-    /// The same as a guide spells it.
-    #[serde(default)]
-    pub shown: String,
-    /// Utterances that spoke of it.
-    pub utterances: u64,
-    /// Region that most likely bears it.
-    pub region: u64,
 }
 
 /// Answer of `ask/graph`, and what is published on `out/graph`.

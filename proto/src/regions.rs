@@ -1,6 +1,7 @@
-//! Answer of `ask/regions`: the parts of a map that people would call rooms.
+//! Answers of `ask/regions`, the parts of a map that people would call rooms, of `ask/what` and `ask/labels`.
 
 use crate::answer::MapIdentity;
+use crate::stream::Stamp;
 use serde::{Deserialize, Serialize};
 
 /// All regions of the best graph that the robot was in.
@@ -57,4 +58,68 @@ pub struct Doorway {
     pub y_m: f64,
     /// How wide it is.
     pub width_m: f64,
+}
+
+/// Answer of `ask/what`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WhatReply {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// `what`.
+    pub query: String,
+    /// Of which map.
+    pub map: MapIdentity,
+    /// Stamp of the newest message in the answer's map.
+    pub stamp: Stamp,
+    /// The point asked for, or where the robot is: metres, map frame.
+    pub x_m: f64,
+    /// See `x_m`.
+    pub y_m: f64,
+    /// Id of the region in which it lies; none if in none.
+    pub region: Option<u64>,
+    /// What kind of space that is by its shape: `corridor`, `room`, `hall`.
+    pub kind: Option<String>,
+    /// What it may be called, likeliest first.
+    pub names: Vec<Called>,
+    /// Posterior mass of graphs that were dropped.
+    #[serde(default)]
+    pub unresolved: f64,
+}
+
+/// A name that may apply.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Called {
+    /// As the map knows it.
+    pub label: String,
+    /// As a guide spells it.
+    pub shown: String,
+    /// Probability that it applies.
+    pub p: f64,
+}
+
+/// Answer of `ask/labels`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LabelsReply {
+    /// [`crate::answer::ANSWER_VERSION`].
+    pub v: u32,
+    /// `labels`.
+    pub query: String,
+    /// Of which map.
+    pub map: MapIdentity,
+    /// All names taught.
+    pub labels: Vec<LabelEntry>,
+}
+
+/// A name.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LabelEntry {
+    /// The name.
+    pub label: String,
+    /// The same as a guide spells it.
+    #[serde(default)]
+    pub shown: String,
+    /// Utterances that spoke of it.
+    pub utterances: u64,
+    /// Region that most likely bears it.
+    pub region: u64,
 }
