@@ -3,8 +3,7 @@
 mod standing;
 mod unseen;
 
-use crate::answers::named::Named;
-use crate::answers::snapshot::{Now, Snapshot, open_poses};
+use crate::answers::snapshot::{Now, Shared, Snapshot, open_poses};
 use crate::answers::spoken;
 use crate::edge::Vertex;
 use crate::effects::{Effect, Effects};
@@ -23,7 +22,7 @@ use crate::trial::Trial;
 use crate::{Answer, Config, Event, Query};
 use nalgebra::Matrix3;
 use serde::{Deserialize, Serialize};
-use std::sync::{Arc, OnceLock};
+use std::sync::Arc;
 
 /// The robot's pose in the map has changed by this without a motion: that is told …
 const JUMP_M: f64 = 0.05;
@@ -43,9 +42,9 @@ pub struct Mapper {
     rev: u64,
     /// Changes of coordinates since the last jump, too small to tell each: the map's frame now from that told.
     untold: Pose2,
-    /// Rooms of the posterior as it is, once somebody asked for them.
+    /// With snapshots of the posterior as it is.
     #[serde(skip)]
-    named: Arc<OnceLock<Named>>,
+    shared: Shared,
     /// What is spoilt on purpose; goes with a restart.
     #[serde(skip)]
     trial: Trial,
@@ -98,7 +97,7 @@ impl Mapper {
             epoch: 0,
             rev: 0,
             untold: Pose2::default(),
-            named: Arc::default(),
+            shared: Shared::default(),
             trial,
         }
     }
@@ -134,7 +133,7 @@ impl Mapper {
         Arc::new(Snapshot::new(
             &self.filter,
             self.talk.ledger.clone(),
-            self.named.clone(),
+            self.shared.clone(),
             self.track.front.open_places().cloned().collect(),
             Now {
                 robot: self.map_from_body(),
@@ -210,7 +209,10 @@ impl Mapper {
     fn place_waiting(&mut self, now_ns: Option<StampNs>, effects: &mut Effects) {
         while let Some(waiting) = self.track.next_due(now_ns) {
             if let Some(placed) = self.track.place(&waiting, effects) {
-                self.rev += u64::from(placed.began);
+                if placed.began {
+                    self.rev += 1;
+                    self.shared = self.shared.with_place();
+                }
                 self.corrected(placed.new_from_old, effects);
                 self.grow(placed.frozen, effects);
                 self.stand(effects);
@@ -238,7 +240,7 @@ impl Mapper {
         let before = self.map_from_body();
         effects.extend(change(&mut self.filter, &mut self.talk));
         self.rev += 1;
-        self.named = Arc::default();
+        self.shared = Shared::default();
         self.standing.renew();
         if let (Some(old), Some(new)) = (before, self.map_from_body()) {
             self.moved(&old, &new, effects);

@@ -124,10 +124,8 @@ impl<'a> Layout<'a> {
 
     /// Whether who is at a pose, in a corridor, has a room before them down that corridor.
     pub fn is_down(&self, room: usize, corridor: usize, at: &Pose) -> bool {
-        let Some(door) = self.doors[room].filter(|d| d.from == corridor) else { return false };
-        let (dx, dy) = (door.at[0] - at.x_m, door.at[1] - at.y_m);
-        let off_rad = crate::geom::wrap(dy.atan2(dx) - at.yaw_rad).abs();
-        DOWN_M.contains(&dx.hypot(dy)) && off_rad <= DOWN_RAD
+        let door = self.door_from(room, corridor, at);
+        door.is_some_and(|[x, y]| DOWN_M.contains(&x.hypot(y)) && y.atan2(x).abs() <= DOWN_RAD)
     }
 
     /// Where the door of a room is from a pose in the corridor that it opens to: so far ahead, and to the left.

@@ -56,9 +56,7 @@ pub(super) enum Form {
     This,
     Another,
     Again,
-    Down(String),
-    NextTo(String),
-    /// By so many relations.
+    /// So, by so many relations.
     Lies(String, usize),
 }
 
@@ -77,8 +75,6 @@ impl Form {
             Self::This => format!("This is the {name}."),
             Self::Another => format!("This is another {name}."),
             Self::Again => format!("We are in the {name} again."),
-            Self::Down(corridor) => format!("The {name} is down the {corridor}."),
-            Self::NextTo(room) => format!("The {name} is next to the {room}."),
             Self::Lies(how, _) => format!("The {name} is {how}."),
         }
     }
@@ -87,7 +83,6 @@ impl Form {
     fn relations(&self) -> usize {
         match self {
             Self::This | Self::Another | Self::Again => 0,
-            Self::Down(_) | Self::NextTo(_) => 1,
             Self::Lies(_, relations) => *relations,
         }
     }
@@ -212,8 +207,8 @@ fn elsewhere(tour: &Tour, stays: &[Visit], thoughts: &mut [Thought], draw: &mut 
                 && at_s < stay.to_s
                 && !quiet.iter().any(|(from, to)| (*from..*to).contains(&at_s));
             let form = match mark.kind {
-                RoomKind::Corridor => Form::Down(mark.name.clone()),
-                RoomKind::Room => Form::NextTo(mark.name.clone()),
+                RoomKind::Corridor => Form::Lies(format!("down the {}", mark.name), 1),
+                RoomKind::Room => Form::Lies(format!("next to the {}", mark.name), 1),
             };
             fit.then_some((at_s, form, stay.room))
         });

@@ -20,8 +20,7 @@ impl Snapshot {
     pub fn called(&self, region: usize) -> Vec<(String, f64)> {
         let (named, ledger) = (self.named(), self.ledger());
         let mut names: BTreeMap<LabelId, f64> = named.given_names(region, ledger).into_iter().collect();
-        names
-            .extend(named.described_names(ledger).into_iter().map(|(label, which)| (label, which.p[region])));
+        names.extend(named.described_names(ledger).map(|(label, which)| (label, which.p[region])));
         let spelled = |(label, p): (LabelId, f64)| (ledger.name(label).to_owned(), p);
         let mut names: Vec<(String, f64)> = names
             .into_iter()
@@ -89,6 +88,6 @@ impl Snapshot {
     }
 
     fn candidates_of(&self, label: LabelId) -> Vec<Candidate> {
-        self.found(label).regions.into_iter().map(|r| self.candidate(label, r)).collect()
+        self.found(label).bearers.into_iter().map(|r| self.candidate(label, r)).collect()
     }
 }

@@ -9,18 +9,17 @@ use crate::event::StampNs;
 use crate::filter::labels::{Evidence, LabelId, Labels, Source};
 use crate::filter::naming::Tally;
 use crate::geometry::{Pose2, wrap};
-use crate::language::GroundPlace;
 use crate::language::act::Restriction;
+use crate::language::{GroundPlace, READ};
 use crate::regions::{Region, Rooms, Shape};
 use crate::talk::describe::located;
 use crate::talk::ledger::{Entry, Ledger};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::{Arc, OnceLock};
 
-/// δ: what is said once, and nothing else of that room, is false or misheard so often, in odds. As η and the share of names that are nowhere, from tours of
-/// plans with 0 and 20 % of false talk (`tours --tour plans`, seeds 301 to 340).
+/// δ: what is said once, and nothing else of that room, is false or misheard so often, in odds; that plain words are misread
+/// ([`READ`]) counts here. As η, from tours of plans with 0 and 20 % of false talk (`tours --tour plans`, seeds 301 to 340).
 pub const FALSE_ODDS: f64 = 0.05;
-/// So likely the likeliest reading of a sentence is at the most; that sentences of plain words are misread counts in δ.
-pub const READ_MAX: f64 = 0.9;
 /// η: the same for each time that the room was called something else.
 const RIVAL: f64 = 0.35;
 /// In a region that is longer, names are said of spots: of the fountain in a corridor, of the bar in a hall.
@@ -39,19 +38,22 @@ pub enum Spot {
 #[derive(Clone, Debug, Default)]
 pub struct Named {
     /// The rooms.
-    pub rooms: Rooms,
+    pub rooms: Arc<Rooms>,
     /// All places, not frozen ones too, in the best graph's map.
     places: Vec<GroundPlace>,
     stamps_ns: Vec<StampNs>,
     /// The region of each frozen place.
     region_of: Vec<Option<usize>>,
+    /// Of utterances that are evidence the place held, and the region in which who spoke was.
+    said_in: BTreeMap<u32, (Vertex, Option<usize>)>,
     /// What was said outright of each region.
     outright: Vec<BTreeMap<LabelId, Tally>>,
-    /// Names that something which stands describes.
-    described: BTreeSet<LabelId>,
+    /// Names that something which stands describes, and where that puts them, once somebody asked.
+    described: BTreeMap<LabelId, OnceLock<Option<Described>>>,
 }
 
-/// A description and what comes of it.
+/// What comes of a name's descriptions.
+#[derive(Clone, Debug)]
 pub struct Described {
     /// Which region is meant.
     pub which: Which,
@@ -64,7 +66,7 @@ pub struct Described {
 impl Named {
     /// Of the best graph: rooms, all places with their stamps, and what is said of them.
     pub fn new(
-        rooms: Rooms,
+        rooms: Arc<Rooms>,
         (places, stamps_ns): (Vec<GroundPlace>, Vec<StampNs>),
         labels: &Labels,
         ledger: &Ledger,
@@ -76,11 +78,16 @@ impl Named {
             }
         }
         let outright = vec![BTreeMap::new(); rooms.regions.len()];
-        let described = figures(ledger);
-        let mut named = Self { rooms, places, stamps_ns, region_of, outright, described };
+        let described = figures(ledger).into_iter().map(|label| (label, OnceLock::new())).collect();
+        let said_in = BTreeMap::new();
+        let mut named = Self { rooms, places, stamps_ns, region_of, said_in, outright, described };
         for e in labels.evidence() {
-            let spot = named.spot(e, ledger);
-            if let Some(r) = named.region(spot) {
+            let entry = ledger.entries().get(e.utterance as usize);
+            if let Some((entry, speaker)) = entry.and_then(|entry| Some((entry, named.speaker(entry)?))) {
+                let region = || named.rooms.at(speaker.pose.x_m, speaker.pose.y_m);
+                named.said_in.entry(e.utterance).or_insert_with(|| (entry.held, region()));
+            }
+            if let Some(r) = named.region(named.spot(e)) {
                 let tally: &mut Tally = named.outright[r].entry(e.label).or_default();
                 match e.source {
                     Source::Direct | Source::DirectOther => tally.said += e.weight,
@@ -93,13 +100,10 @@ impl Named {
     }
 
     /// Of what a piece of evidence speaks. Of where one is, who says it is, and a place is some steps long.
-    pub fn spot(&self, e: &Evidence, ledger: &Ledger) -> Spot {
-        let entry = ledger.entries().get(e.utterance as usize);
-        let here = entry.filter(|entry| entry.held == e.place && e.source != Source::Carried);
-        let region = match here.and_then(|entry| self.speaker(entry)) {
-            Some(Speaker { pose, .. }) => self.rooms.at(pose.x_m, pose.y_m),
-            None => self.region_of.get(e.place as usize).copied().flatten(),
-        };
+    pub fn spot(&self, e: &Evidence) -> Spot {
+        let said_in = self.said_in.get(&e.utterance);
+        let here = said_in.filter(|(held, _)| *held == e.place && e.source != Source::Carried);
+        let region = here.map_or_else(|| self.region(Spot::Place(e.place)), |(_, region)| *region);
         let room = region.filter(|&r| !is_wide(&self.rooms.regions[r]));
         room.map_or(Spot::Place(e.place), Spot::Region)
     }
@@ -148,15 +152,12 @@ impl Named {
 
     /// Whether something which stands describes where a name is.
     pub fn is_described(&self, label: LabelId) -> bool {
-        self.described.contains(&label)
+        self.described.contains_key(&label)
     }
 
-    /// Where a name's descriptions put it; none if there are none.
-    pub fn described(&self, label: LabelId, ledger: &Ledger) -> Option<Described> {
-        if !self.is_described(label) {
-            return None;
-        }
-        self.described_at(label, ledger, 0)
+    /// Where a name's descriptions put it; none if there are none, or nobody knows their landmarks.
+    pub fn described(&self, label: LabelId, ledger: &Ledger) -> Option<&Described> {
+        self.described.get(&label)?.get_or_init(|| self.described_at(label, ledger, 0)).as_ref()
     }
 
     /// The same by what descriptions were grounded to in a particle, each a distribution over places.
@@ -207,10 +208,10 @@ impl Named {
     }
 
     /// Where descriptions put the names that nothing was called outright.
-    pub fn described_names(&self, ledger: &Ledger) -> Vec<(LabelId, Which)> {
+    pub fn described_names<'a>(&'a self, ledger: &'a Ledger) -> impl Iterator<Item = (LabelId, &'a Which)> {
         let is_given = |label: &LabelId| self.outright.iter().any(|names| names.contains_key(label));
-        let open = self.described.iter().copied().filter(|label| !is_given(label));
-        open.filter_map(|label| Some((label, self.described(label, ledger)?.which))).collect()
+        let open = self.described.keys().copied().filter(move |label| !is_given(label));
+        open.filter_map(|label| Some((label, &self.described(label, ledger)?.which)))
     }
 
     /// How often something was called otherwise, outright.
@@ -220,15 +221,15 @@ impl Named {
         self.outright[r].iter().filter(|(l, _)| is_rival(l)).map(|(_, t)| t.concentration()).sum()
     }
 
-    /// How much likelier each region is meant by a name where a question says how it lies, "the bathroom *next to the
-    /// lounge*", and how much likelier none is.
+    /// By region, how much likelier it is meant by a name where a question says how it lies: "the bathroom *next to the
+    /// lounge*".
     pub fn narrowed(
         &self,
         label: LabelId,
         within: &[Restriction],
         ledger: &Ledger,
         speaker: &Speaker,
-    ) -> Which {
+    ) -> Vec<f64> {
         let other = self.other(label, ledger);
         let scene = Scene::new(&self.rooms, &self.places, &other, ledger.is_way(label));
         let prior = Which::anywhere(&scene);
@@ -239,8 +240,7 @@ impl Named {
             within.iter().filter_map(|r| sense.lies((r.relation, &r.modifiers, &r.landmarks), None, speaker));
         let all = each.reduce(|a, b| a.and(&b, prior, DOUBT)).unwrap_or_else(|| prior.clone());
         let ratio = |p: f64, prior: f64| (1.0 - DOUBT) * p / prior.max(1e-9) + DOUBT;
-        let p = all.p.iter().zip(&prior.p).map(|(&p, &prior)| ratio(p, prior)).collect();
-        Which { p, p_none: 1.0 }
+        all.p.iter().zip(&prior.p).map(|(&p, &prior)| ratio(p, prior)).collect()
     }
 
     /// By region, the probability that it was given another name outright.
@@ -270,8 +270,8 @@ impl Named {
 /// P(name was rightly given), by what was said for it and against it, and how often something else. What one sentence may
 /// have said is as likely as that it said so.
 pub fn given(tally: Tally, rivals: f64) -> f64 {
-    let said = tally.concentration() / READ_MAX;
-    said / (said.max(1.0) + FALSE_ODDS + RIVAL * rivals / READ_MAX)
+    let said = tally.concentration() / READ;
+    said / (said.max(1.0) + FALSE_ODDS + RIVAL * rivals / READ)
 }
 
 /// Names that something which stands describes.
@@ -294,4 +294,4 @@ fn is_wide(region: &Region) -> bool {
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -45,6 +45,22 @@ pub(crate) struct Now {
     pub rev: u64,
 }
 
+/// What snapshots share, made by the first that is asked for it.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Shared {
+    /// Of one posterior.
+    rooms: Arc<OnceLock<Arc<Rooms>>>,
+    /// Of one posterior and the places that it has, not frozen ones too.
+    named: Arc<OnceLock<Named>>,
+}
+
+impl Shared {
+    /// The same posterior with one more place that is not frozen.
+    pub fn with_place(&self) -> Self {
+        Self { rooms: self.rooms.clone(), named: Arc::default() }
+    }
+}
+
 /// The posterior at one moment.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
@@ -57,18 +73,18 @@ pub struct Snapshot {
     /// Posterior mass of graphs that were dropped.
     unresolved: f64,
     ledger: Arc<Ledger>,
-    named: Arc<OnceLock<Named>>,
+    shared: Shared,
     /// Descriptions are where the paper's rule put them.
     by_paper: bool,
     now: Now,
 }
 
 impl Snapshot {
-    /// `named`: the rooms of the same posterior, once somebody asked for them.
+    /// `shared`: with other snapshots of the same posterior and places.
     pub(crate) fn new(
         filter: &Filter,
         ledger: Arc<Ledger>,
-        named: Arc<OnceLock<Named>>,
+        shared: Shared,
         open: Vec<OpenPlace>,
         now: Now,
     ) -> Self {
@@ -76,7 +92,7 @@ impl Snapshot {
         let poses = poses(filter.best(), &places, &open);
         let (structure, particles) = (filter.structure.clone(), filter.particles.clone());
         let (unresolved, by_paper) = (filter.unresolved(), filter.config.rules.by_paper());
-        Self { places, open, structure, particles, poses, unresolved, ledger, named, by_paper, now }
+        Self { places, open, structure, particles, poses, unresolved, ledger, shared, by_paper, now }
     }
 
     /// +1 when the map's coordinates jump.
@@ -132,17 +148,19 @@ impl Snapshot {
     }
 
     /// Regions of the best graph: made when first asked for, for all snapshots of one posterior together.
-    pub fn rooms(&self) -> &Rooms {
-        &self.named().rooms
+    pub fn rooms(&self) -> &Arc<Rooms> {
+        self.shared.rooms.get_or_init(|| {
+            let posed: Vec<(Pose2, Arc<Place>)> =
+                self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
+            Arc::new(Rooms::new(&posed))
+        })
     }
 
     /// The same with what they are called.
     pub(crate) fn named(&self) -> &Named {
-        self.named.get_or_init(|| {
-            let posed: Vec<(Pose2, Arc<Place>)> =
-                self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
-            let (labels, ledger) = (&self.particles[0].labels, &self.ledger);
-            Named::new(Rooms::new(&posed), self.ground_places(), labels, ledger)
+        self.shared.named.get_or_init(|| {
+            let (rooms, labels) = (self.rooms().clone(), &self.particles[0].labels);
+            Named::new(rooms, self.ground_places(), labels, &self.ledger)
         })
     }
 
@@ -271,10 +289,12 @@ impl Snapshot {
         Speech::new(lang, self.ledger.glossary.clone())
     }
 
-    /// Whether a question is about the robot's own place: "where am I?" Who is lost can't be told.
+    /// Whether a question counts from the robot: "where am I?", "the nearest exit". Who is lost can't be told.
     pub fn is_of_robot(&self, text: &str, lang: Option<&str>) -> bool {
         let of_here = |act: &Act| match &act.content {
-            Content::Ask { kind: Question::Where, about: About::Phrase(phrase) } => phrase.head == Head::Here,
+            Content::Ask { kind: Question::Where, about: About::Phrase(phrase) } => {
+                phrase.head == Head::Here || phrase.features.nearest
+            }
             _ => false,
         };
         self.speech(lang).is_some_and(|speech| speech.parse(text).acts().iter().any(of_here))

@@ -43,7 +43,7 @@ const RATIO_MAX: f64 = 20.0;
 
 /// A spot that may bear the name.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Region {
+pub struct Bearer {
     /// A room, or a spot.
     pub spot: Spot,
     /// Index of the region in which it lies.
@@ -60,7 +60,7 @@ pub struct Region {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Whereabouts {
     /// The likeliest first.
-    pub regions: Vec<Region>,
+    pub bearers: Vec<Bearer>,
     /// Probability that it applies nowhere seen.
     pub p_none: f64,
 }
@@ -81,14 +81,12 @@ pub struct Known<'a> {
 
 /// Where a name applies; what is less probable than `p_min` is left out.
 pub fn whereabouts(known: &Known, label: LabelId, p_min: f64) -> Whereabouts {
-    let described = if known.by_paper {
-        known.named.grounded(label, &known.particles[0].labels)
-    } else {
-        known.named.described(label, known.ledger)
-    };
+    let by_paper = known.by_paper.then(|| known.named.grounded(label, &known.particles[0].labels)).flatten();
+    let described =
+        if known.by_paper { by_paper.as_ref() } else { known.named.described(label, known.ledger) };
     let mut spots = spots(known, label);
     let said = spots.len();
-    if let Some(Described { which, .. }) = &described {
+    if let Some(Described { which, .. }) = described {
         let is_said = |r: usize| spots.iter().any(|s| known.named.region(s.0) == Some(r));
         let likely = (0..which.p.len()).filter(|&r| which.p[r] >= p_min && !is_said(r)).map(Spot::Region);
         let new: Vec<(Spot, Vertex)> = likely.map(|spot| (spot, known.named.anchor(spot, None))).collect();
@@ -97,19 +95,18 @@ pub fn whereabouts(known: &Known, label: LabelId, p_min: f64) -> Whereabouts {
     let mut found = Whereabouts::default();
     let region = |&(spot, place): &(Spot, Vertex)| {
         let room = known.named.region(spot);
-        Region { spot, room, place, p_is: 0.0, probability: 0.0 }
+        Bearer { spot, room, place, p_is: 0.0, probability: 0.0 }
     };
-    found.regions = spots.iter().map(region).collect();
+    found.bearers = spots.iter().map(region).collect();
     for particle in known.particles {
-        Map::new(known, particle, &spots[..said], label).share_out(described.as_ref(), &mut found);
+        Map::new(known, particle, &spots[..said], label).share_out(described, &mut found);
     }
-    // What is left out is none of those told.
-    let (kept, left): (Vec<Region>, Vec<Region>) =
-        found.regions.into_iter().partition(|r| r.probability >= p_min || r.p_is >= p_min);
-    let mut regions = kept;
-    regions.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
+    // Spots that are one with another in all maps are told once; what else is left out is none of those told.
+    let is_told = |b: &Bearer| b.probability > 0.0 && b.probability.max(b.p_is) >= p_min;
+    let (mut bearers, left): (Vec<Bearer>, Vec<Bearer>) = found.bearers.into_iter().partition(is_told);
+    bearers.sort_by(|a, b| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
     let p_none = found.p_none + left.iter().map(|r| r.probability).sum::<f64>();
-    Whereabouts { regions, p_none }
+    Whereabouts { bearers, p_none }
 }
 
 /// Whether a piece of evidence says outright what something is called.
@@ -119,18 +116,20 @@ fn is_outright(e: &Evidence, label: LabelId) -> bool {
 
 /// Spots of which something was said outright, in any map, with the place that stands for each: where it was said.
 fn spots(known: &Known, label: LabelId) -> Vec<(Spot, Vertex)> {
-    let mut said: BTreeMap<Spot, (f64, Vertex)> = BTreeMap::new();
+    let mut said: BTreeMap<Spot, (f64, u32, Vertex)> = BTreeMap::new();
     let evidence = known.particles.iter().flat_map(|p| p.labels.evidence());
     for e in evidence.filter(|e| is_outright(e, label) && e.source != Source::Denied) {
-        let (weight, place) = said.entry(known.named.spot(e, known.ledger)).or_insert((0.0, e.place));
-        (*weight, *place) = (*weight + e.weight, (*place).min(e.place));
+        let spot = said.entry(known.named.spot(e)).or_insert((0.0, e.utterance, e.place));
+        spot.0 += e.weight;
+        (spot.1, spot.2) = (spot.1, spot.2).min((e.utterance, e.place));
     }
-    let mut spots: Vec<(Spot, f64, Vertex)> = said.into_iter().map(|(s, (w, v))| (s, w, v)).collect();
-    spots.sort_by(|a, b| b.1.total_cmp(&a.1).then(a.0.cmp(&b.0)));
+    let mut spots: Vec<_> = said.into_iter().collect();
+    spots.sort_by(|a, b| b.1.0.total_cmp(&a.1.0).then(a.0.cmp(&b.0)));
     spots.truncate(SPOTS_MAX);
-    let place = |(spot, _, v): (Spot, f64, Vertex)| {
-        let first = known.ledger.entries().iter().find(|e| e.held == v);
-        let at = first.and_then(|e| known.named.speaker(e)).map(|s| (s.pose.x_m, s.pose.y_m));
+    // It stands for its spot where the name was given first.
+    let place = |(spot, (_, utterance, place)): (Spot, (f64, u32, Vertex))| {
+        let entry = known.ledger.entries().get(utterance as usize).filter(|entry| entry.held == place);
+        let at = entry.and_then(|entry| known.named.speaker(entry)).map(|s| (s.pose.x_m, s.pose.y_m));
         (spot, known.named.anchor(spot, at))
     };
     spots.into_iter().map(place).collect()
@@ -152,7 +151,7 @@ impl Map {
         // By utterance and cluster the most that it says: what it says of places near each other is one thing.
         let mut said: BTreeMap<(u32, usize), (f64, f64)> = BTreeMap::new();
         for e in particle.labels.evidence().iter().filter(|e| is_outright(e, label)) {
-            let spot = known.named.spot(e, known.ledger);
+            let spot = known.named.spot(e);
             let of = spots.iter().position(|s| s.0 == spot).map(|k| cluster[k]);
             if let Some(of) = of {
                 let most = said.entry((e.utterance, of)).or_default();
@@ -180,35 +179,35 @@ impl Map {
         let unknown: f64 = firsts().map(|k| 1.0 - told(k)).product();
         let unknown = if sum > 0.0 { NOWHERE * unknown } else { 1.0 };
         let known = if described.is_some() { (1.0 - unknown).min(KNOWN_MAX) } else { 1.0 - unknown };
-        let q = |r: &Region| match (r.room, described) {
+        let q = |r: &Bearer| match (r.room, described) {
             (Some(room), Some(d)) => (d.which.p[room], d.prior.p[room]),
             _ => (0.0, 0.0),
         };
-        let ratio = |r: &Region| match q(r) {
+        let ratio = |r: &Bearer| match q(r) {
             _ if described.is_none() => 1.0,
             (p, prior) if prior > 0.0 => LOOSE + (1.0 - LOOSE) * (p / prior).min(RATIO_MAX),
             _ => LOOSE,
         };
-        let of_spot = |k: usize, r: &Region| {
+        let of_spot = |k: usize, r: &Bearer| {
             let outright = if k < said && sum > 0.0 { known * odds(k) / sum * ratio(r) } else { 0.0 };
             outright + if k < said { 0.0 } else { (1.0 - known) * q(r).0 }
         };
         let p: Vec<f64> = found
-            .regions
+            .bearers
             .iter()
             .enumerate()
             .map(|(k, r)| if is_first(k) { of_spot(k, r) } else { 0.0 })
             .collect();
         // A room that bears the name, and one too unlikely to be told, are none of the others.
         let described_none = described.map_or(1.0, |d| {
-            1.0 - found.regions.iter().skip(said).map(|r| q(r).0).sum::<f64>()
-                - said_by(d, &found.regions[..said])
+            1.0 - found.bearers.iter().skip(said).map(|r| q(r).0).sum::<f64>()
+                - said_by(d, &found.bearers[..said])
         });
         let none = (1.0 - known) * described_none.max(0.0);
         let all = p.iter().sum::<f64>() + none;
         let scale = if all > 0.0 { self.weight / all } else { 0.0 };
         found.p_none += if all > 0.0 { scale * none } else { self.weight };
-        for (k, (region, p)) in found.regions.iter_mut().zip(p).enumerate() {
+        for (k, (region, p)) in found.bearers.iter_mut().zip(p).enumerate() {
             region.probability += scale * p;
             let outright = if k < said { told(k) } else { 0.0 };
             let new = if k < said { 0.0 } else { p / all.max(f64::MIN_POSITIVE) };
@@ -218,7 +217,7 @@ impl Map {
 }
 
 /// What descriptions give the spots that bear the name.
-fn said_by(described: &Described, spots: &[Region]) -> f64 {
+fn said_by(described: &Described, spots: &[Bearer]) -> f64 {
     let rooms: BTreeSet<usize> = spots.iter().filter_map(|r| r.room).collect();
     rooms.into_iter().map(|room| described.which.p[room]).sum()
 }
@@ -243,8 +242,10 @@ fn clusters(known: &Known, particle: &Particle, spots: &[(Spot, Vertex)]) -> Vec
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::answers::named::{FALSE_ODDS, READ_MAX};
+    use crate::answers::named::FALSE_ODDS;
+    use crate::answers::named::tests::{first, heard};
     use crate::filter::labels::DIRECT;
+    use crate::language::READ;
     use proptest::prelude::*;
 
     /// Particles with weights, whose places lie along x where told, and what all have heard.
@@ -277,12 +278,12 @@ mod tests {
     fn an_utterance_and_what_an_edge_carried_over_are_one_witness() {
         let carried = Evidence::new(0, 0, 1, 0.5, Source::Carried);
         let one = found(&[(1.0, &[0.0, 1.0])], &[direct(0, 0), carried]);
-        assert_eq!(one.regions.len(), 1);
-        let told = 1.0 / (1.0 / READ_MAX + FALSE_ODDS) / READ_MAX;
-        assert!((one.regions[0].p_is - told).abs() < 1e-9, "{one:?}");
+        assert_eq!(one.bearers.len(), 1);
+        let told = 1.0 / (1.0 / READ + FALSE_ODDS) / READ;
+        assert!((one.bearers[0].p_is - told).abs() < 1e-9, "{one:?}");
         assert!((one.p_none - NOWHERE * (1.0 - told)).abs() < 1e-9);
         let two = found(&[(1.0, &[0.0, 1.0])], &[direct(0, 0), carried, direct(1, 0)]);
-        assert!(two.regions[0].p_is > told && two.regions[0].p_is < 1.0, "{two:?}");
+        assert!(two.bearers[0].p_is > told && two.bearers[0].p_is < 1.0, "{two:?}");
     }
 
     #[test]
@@ -290,38 +291,67 @@ mod tests {
         // Said twice; in the best map of two rooms, in the other of one.
         let maps: [(f64, &[f64]); 2] = [(0.6, &[0.0, 50.0]), (0.4, &[0.0, 1.0])];
         let two = found(&maps, &[direct(0, 0), direct(1, 1)]);
-        let [a, b] = &two.regions[..] else { panic!("{two:?}") };
+        let [a, b] = &two.bearers[..] else { panic!("{two:?}") };
         assert!(a.p_is > 0.9 && b.p_is > 0.9, "{two:?}");
-        let not = |said: f64| FALSE_ODDS / (said / READ_MAX + FALSE_ODDS);
+        let not = |said: f64| FALSE_ODDS / (said / READ + FALSE_ODDS);
         let none = NOWHERE * (0.6 * not(1.0) * not(1.0) + 0.4 * not(2.0));
         assert!((two.p_none - none).abs() < 1e-9, "{two:?}");
         assert!((a.probability - b.probability - 0.4 * (1.0 - none)).abs() < 0.02, "{two:?}");
         // The best map has them as one, the other apart: that is a region, too.
         let maps: [(f64, &[f64]); 2] = [(0.6, &[0.0, 1.0]), (0.4, &[0.0, 50.0])];
-        assert_eq!(found(&maps, &[direct(0, 0), direct(1, 1)]).regions.len(), 2);
+        assert_eq!(found(&maps, &[direct(0, 0), direct(1, 1)]).bearers.len(), 2);
+    }
+
+    #[test]
+    fn a_name_said_again_beside_the_first_time_is_told_once() {
+        let again = found(&[(1.0, &[0.0, 2.0, 50.0])], &[direct(0, 0), direct(1, 1), direct(2, 2)]);
+        assert_eq!(again.bearers.len(), 2, "{again:?}");
+    }
+
+    #[test]
+    fn what_is_named_outright_keeps_a_description_that_disagrees_at_arms_length() {
+        let described = ("The gym is across from the kitchen.", None);
+        let kitchen = ("This is the kitchen.", Some(first(2)));
+        let gym = |said: &[(&str, Option<u32>)]| {
+            let (named, ledger, labels) = heard(said);
+            let particles = [Particle { labels, ..Particle::empty() }];
+            let pose = |_: &Particle, v: Vertex| Some(Pose2::new(f64::from(v), 0.0, 0.0));
+            let known =
+                Known { particles: &particles, pose: &pose, named: &named, ledger: &ledger, by_paper: false };
+            whereabouts(&known, ledger.label("gym").unwrap(), 0.01)
+        };
+        let in_room = |found: &Whereabouts, room: usize| {
+            found.bearers.iter().filter(|b| b.room == Some(room)).map(|b| b.probability).sum::<f64>()
+        };
+        let alone = gym(&[kitchen, described]);
+        assert!(in_room(&alone, 6) > 0.4 && alone.p_none > 0.0, "{alone:?}");
+        let elsewhere = gym(&[kitchen, described, ("This is the gym.", Some(first(1)))]);
+        assert!(in_room(&elsewhere, 1) > 0.8 && in_room(&elsewhere, 6) > 0.0, "{elsewhere:?}");
+        let there = gym(&[kitchen, described, ("This is the gym.", Some(first(6)))]);
+        assert!(in_room(&there, 6) > in_room(&elsewhere, 1), "{there:?}");
+        for found in [alone, elsewhere, there] {
+            let sum = found.bearers.iter().map(|b| b.probability).sum::<f64>() + found.p_none;
+            assert!((sum - 1.0).abs() < 1e-9, "{found:?}");
+        }
     }
 
     proptest! {
         #[test]
         fn probabilities_and_none_sum_to_one(
-            heard in prop::collection::vec((0_u32..8, 0_u32..6, 0.02..1.0_f64, 0..3_u8), 0..12),
+            heard in prop::collection::vec((0_u32..8, 0_u32..6, 0.02..1.0_f64, any::<bool>()), 0..12),
             first in prop::collection::vec(0.0..60.0_f64, 6), second in prop::collection::vec(0.0..60.0_f64, 6),
         ) {
             let evidence: Vec<Evidence> = heard
                 .iter()
-                .map(|&(utterance, place, weight, kind)| {
-                    let (weight, source) = match kind {
-                        0 => (weight, Source::Direct),
-                        1 => (weight / 12.0, Source::Grounded),
-                        _ => (-weight, Source::Denied),
-                    };
+                .map(|&(utterance, place, weight, denied)| {
+                    let (weight, source) = if denied { (-weight, Source::Denied) } else { (weight, Source::Direct) };
                     Evidence::new(utterance, 0, place, weight, source)
                 })
                 .collect();
             let found = found(&[(0.7, &first), (0.3, &second)], &evidence);
-            let sum = found.regions.iter().map(|r| r.probability).sum::<f64>() + found.p_none;
+            let sum = found.bearers.iter().map(|r| r.probability).sum::<f64>() + found.p_none;
             prop_assert!((sum - 1.0).abs() < 1e-9);
-            prop_assert!(found.regions.iter().all(|r| (0.0..=1.0 + 1e-9).contains(&r.p_is)));
+            prop_assert!(found.bearers.iter().all(|r| (0.0..=1.0 + 1e-9).contains(&r.p_is)));
         }
     }
 }

@@ -44,6 +44,7 @@ pub use act::{Act, Analysis, Content, Frame, Parse, Phrase, Sameness};
 pub use clauses::{Clause, clauses};
 pub use glossary::Glossary;
 pub use grammar::ask::asked_name;
+pub use grammar::parse::READ;
 pub use grounding::clause::{LandmarkBelief, Narrowing, Reading};
 pub use grounding::footprint::Footprint;
 pub use grounding::ground::{Grounding, densities, ground_clause, ground_with};

@@ -1,4 +1,18 @@
 //! What tells of a region whether it is the one that is described.
+//!
+//! | of a region R | by | |
+//! |---|---|---|
+//! | 0, 1 | the path driven (15) | ln of the most and of the mean density at its places, as shares of a room |
+//! | 2, 3 | the landmark | length of the wall in common, nearness of outlines |
+//! | 4, 6, 7 | | nearness of doorways; by that: facing each other, side by side |
+//! | 5, 8, 18 | | one opens into the other; nearness of middles; two landmarks lie on either side |
+//! | 9, 10, 11 | R | a corridor, where none is looked for; P(bears another name); ln of its area |
+//! | 12, 13 | the sentence | first entered after it; soon after it |
+//! | 14, 15, 16, 17 | the speaker | is in R; has its door ahead; near; on the side that is said |
+//! | 19, 20 | R | ln of its places; the robot went in and came out by one way |
+//!
+//! Of "not in the map yet": 21 one; 22 ln of the way driven since; 23, 24 openings that were not entered, by the landmark and by the
+//! speaker; 25 ln of the rooms without another name.
 
 use crate::edge::Vertex;
 use crate::geometry::{Pose2, wrap};

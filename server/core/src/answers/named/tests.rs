@@ -7,7 +7,7 @@ use crate::language::act::About;
 use crate::language::{Content, Name, parse};
 
 /// The wing with what is said in it: each sentence with the place of whose room it speaks, if it names one.
-fn heard(sentences: &[(&str, Option<u32>)]) -> (Named, Ledger) {
+pub(crate) fn heard(sentences: &[(&str, Option<u32>)]) -> (Named, Ledger, Labels) {
     let (rooms, places) = wing();
     let (mut ledger, mut labels) = (Ledger::default(), Labels::default());
     for (k, &(text, place)) in sentences.iter().enumerate() {
@@ -27,14 +27,18 @@ fn heard(sentences: &[(&str, Option<u32>)]) -> (Named, Ledger) {
         }
     }
     let stamps = (0..places.len() as i64).collect();
-    (Named::new(rooms, (places, stamps), &labels, &ledger), ledger)
+    let named = Named::new(Arc::new(rooms), (places, stamps), &labels, &ledger);
+    (named, ledger, labels)
+}
+
+/// The first place of a room.
+pub(crate) fn first(room: usize) -> u32 {
+    wing().0.regions[room].places[0]
 }
 
 #[test]
 fn sentences_put_what_they_describe_and_questions_choose() {
-    // The first place of each room.
-    let first = |room: usize| wing().0.regions[room].places[0];
-    let (named, ledger) = heard(&[
+    let (named, ledger, _) = heard(&[
         ("This is the kitchen.", Some(first(2))),
         ("This is the bathroom.", Some(first(1))),
         ("This is a bathroom.", Some(first(8))),
@@ -53,5 +57,5 @@ fn sentences_put_what_they_describe_and_questions_choose() {
     };
     let speaker = Speaker { pose: Pose2::new(20.0, 1.0, 0.0), place: 3, path_m: 50.0 };
     let so = named.narrowed(of("bathroom"), &within, &ledger, &speaker);
-    assert!(so.p[1] > 5.0 * so.p[8], "{so:?}");
+    assert!(so[1] > 5.0 * so[8], "{so:?}");
 }

@@ -3,7 +3,7 @@
 use super::Snapshot;
 use crate::answers::named::Spot;
 use crate::answers::query::{Candidate, Goal};
-use crate::answers::whereabouts::{Region, SAME_PLACE_M};
+use crate::answers::whereabouts::{Bearer, SAME_PLACE_M};
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
 use crate::filter::labels::{LabelId, Source};
@@ -15,8 +15,8 @@ use std::collections::BTreeSet;
 const BECAUSE_MAX: usize = 32;
 
 impl Snapshot {
-    pub(crate) fn candidate(&self, label: LabelId, region: Region) -> Candidate {
-        let Region { spot, room, place, p_is, probability } = region;
+    pub(crate) fn candidate(&self, label: LabelId, bearer: Bearer) -> Candidate {
+        let Bearer { spot, room, place, p_is, probability } = bearer;
         let pose = self.poses[place as usize];
         let stood = Goal { pose, is_reachable: None };
         let (id, polygon_m, goal) = match room {
@@ -73,14 +73,14 @@ impl Snapshot {
         let mut utterances: BTreeSet<u32> = BTreeSet::new();
         for e in self.particles[0].labels.evidence().iter().filter(|e| e.label == label) {
             let outright = !matches!(e.source, Source::Grounded | Source::Carried);
-            if outright && (named.spot(e, &self.ledger) == spot || is_near(e.place)) {
+            if outright && (named.spot(e) == spot || is_near(e.place)) {
                 utterances.insert(e.utterance);
             }
         }
         if let (Spot::Region(r), Some(described)) = (spot, named.described(label, &self.ledger))
             && described.which.p[r] > described.prior.p[r]
         {
-            utterances.extend(described.utterances);
+            utterances.extend(&described.utterances);
         }
         let newest = utterances.len().saturating_sub(BECAUSE_MAX);
         let ids = utterances.into_iter().skip(newest);

@@ -5,7 +5,7 @@ use crate::answers::described::features::Speaker;
 use crate::answers::meaning::{Meaning, meaning};
 use crate::answers::named::Spot;
 use crate::answers::query::{Candidate, WhereAnswer};
-use crate::answers::whereabouts::{Known, Region, Whereabouts, whereabouts};
+use crate::answers::whereabouts::{Bearer, Known, Whereabouts, whereabouts};
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
 use crate::filter::labels::LabelId;
@@ -27,9 +27,9 @@ pub(crate) struct Asked {
     /// Its name.
     pub name: Name,
     /// How it lies.
-    within: Vec<Restriction>,
+    pub within: Vec<Restriction>,
     /// The nearest that is so.
-    nearest: bool,
+    pub nearest: bool,
 }
 
 impl Snapshot {
@@ -81,7 +81,7 @@ impl Snapshot {
         let path_m = self.places.last().map_or(0.0, |p| p.path_m);
         let so = self.named().narrowed(label, within, &self.ledger, &Speaker { pose, place, path_m });
         let ids: Vec<PlaceId> = self.rooms().regions.iter().map(|r| r.id).collect();
-        let ratio = |c: &Candidate| ids.iter().position(|id| *id == c.place).map_or(1.0, |r| so.p[r]);
+        let ratio = |c: &Candidate| ids.iter().position(|id| *id == c.place).map_or(1.0, |r| so[r]);
         let mut candidates = answer.candidates.clone();
         for c in &mut candidates {
             c.probability *= ratio(c);
@@ -104,9 +104,9 @@ impl Snapshot {
         let named = name.and_then(|(_, name, p)| Some((self.ledger.label(&name)?, p)));
         if let (Some(spot), Some((label, p_is))) = (spot, named) {
             let place = self.named().anchor(spot, Some((robot.x_m, robot.y_m)));
-            let region =
-                Region { spot, room: self.named().region(spot), place, p_is, probability: self.resolved() };
-            answer.candidates = vec![self.candidate(label, region)];
+            let bearer =
+                Bearer { spot, room: self.named().region(spot), place, p_is, probability: self.resolved() };
+            answer.candidates = vec![self.candidate(label, bearer)];
             answer.p_none = self.unresolved;
         }
         answer
@@ -137,10 +137,10 @@ impl Snapshot {
         // One place is meant: names that are as likely share it, as far as each is anywhere.
         let somewhere: f64 = found.iter().map(|(_, found)| 1.0 - found.p_none).sum();
         let share = p * self.resolved() / somewhere.max(1.0);
-        let mut all: Vec<(LabelId, Region)> = Vec::new();
+        let mut all: Vec<(LabelId, Bearer)> = Vec::new();
         for (label, found) in found {
-            let likely = found.regions.into_iter().filter(|r| r.p_is >= CANDIDATE_MIN);
-            all.extend(likely.map(|r| (label, Region { probability: share * r.probability, ..r })));
+            let likely = found.bearers.into_iter().filter(|r| r.p_is >= CANDIDATE_MIN);
+            all.extend(likely.map(|r| (label, Bearer { probability: share * r.probability, ..r })));
         }
         all.sort_by(|(_, a), (_, b)| b.probability.total_cmp(&a.probability).then(a.place.cmp(&b.place)));
         all.truncate(CANDIDATES_MAX);

@@ -25,7 +25,10 @@ fn torn(state: TrackState) -> Snapshot {
     let best = Particle { edges: Arc::new(vec![edge]), log_weight: 0.6_f64.ln(), ..Particle::empty() };
     filter.particles = vec![best, other];
     let now = Now { robot: Some(Pose2::default()), state, epoch: 0, rev: 0 };
-    Snapshot { unresolved: 0.25, ..Snapshot::new(&filter, Arc::default(), Arc::default(), Vec::new(), now) }
+    Snapshot {
+        unresolved: 0.25,
+        ..Snapshot::new(&filter, Arc::default(), Shared::default(), Vec::new(), now)
+    }
 }
 
 #[test]
@@ -58,12 +61,33 @@ fn where_am_i_asks_for_the_robot_and_nothing_else_does() {
     for (text, of_robot) in [
         ("where am I", true),
         ("where are we?", true),
+        ("where is the nearest gym?", true),
         ("where is the gym", false),
         ("gym", false),
         ("how do I get to the library from here", false),
     ] {
         assert_eq!(torn(TrackState::Lost).is_of_robot(text, None), of_robot, "{text}");
     }
+}
+
+#[test]
+fn a_question_says_how_what_is_asked_for_lies() {
+    let map = torn(TrackState::Mapping);
+    for (text, name, within, nearest) in [
+        ("gym", "gym", 0, false),
+        ("where is the gym?", "gym", 0, false),
+        ("where is the bathroom next to the lounge?", "bathroom", 1, false),
+        ("the bathroom next to the lounge", "bathroom", 1, false),
+        ("where is the nearest bathroom?", "bathroom", 0, true),
+    ] {
+        let asked = map.asked(text, None).unwrap();
+        assert_eq!(
+            (asked.name.as_str(), asked.within.len(), asked.nearest),
+            (name, within, nearest),
+            "{text}"
+        );
+    }
+    assert!(map.asked("of the of", None).is_none());
 }
 
 #[test]

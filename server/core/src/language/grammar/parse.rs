@@ -29,7 +29,7 @@ use crate::language::notation::notation;
 /// A text that is wholly read says what is read with this probability, its names being known places; the
 /// rest is for what the grammar misreads. (All of the examples that it reads are read right; a tenth is
 /// a guess on the side of care, and shapes only how hearings compare.)
-const READ: f64 = 0.9;
+pub const READ: f64 = 0.9;
 /// What is left of it for each name that is no known kind of place: it may be misheard.
 const UNKNOWN_NAME: f64 = 0.8;
 /// Analyses of a text that are kept.
