@@ -1,10 +1,11 @@
 //! What the server answers, and its errors. All JSON. Readers ignore fields they don't know, so
 //! that later servers can add some.
 
-use crate::stream::{Pose, Stamp};
+use crate::stream::Stamp;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
+pub use crate::grid::GridReply;
 pub use crate::regions::{Called, LabelEntry, LabelsReply, WhatReply};
 
 pub use crate::feedback::{
@@ -214,27 +215,6 @@ pub struct Edge {
     pub dy_m: f64,
     /// Radians.
     pub dyaw_rad: f64,
-}
-
-/// Answer of `ask/grid`: occupancy of the best graph, row 0 lowest y.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct GridReply {
-    /// [`ANSWER_VERSION`].
-    pub v: u32,
-    /// `grid`.
-    pub query: String,
-    /// Of which map.
-    pub map: MapIdentity,
-    /// Edge of a cell.
-    pub resolution_m: f64,
-    /// Columns.
-    pub width: usize,
-    /// Rows.
-    pub height: usize,
-    /// Pose of the lower left corner in the map.
-    pub map_from_grid: Pose,
-    /// −1 unknown, 0 free … 100 occupied; row-major, `width · height` of them.
-    pub cells: Vec<i8>,
 }
 
 /// Payload of an error reply.

@@ -9,6 +9,8 @@ use serde::{Deserialize, Serialize};
 
 /// Zenoh encoding of JSON payloads.
 pub const ENCODING_JSON: &str = "application/json";
+/// A picture.
+pub const ENCODING_PNG: &str = "image/png";
 /// Zenoh encoding of bincode payloads.
 pub const ENCODING_BINCODE: &str = "application/x-toponym";
 /// First byte of a bincode payload.

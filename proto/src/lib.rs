@@ -16,6 +16,7 @@ pub mod answer;
 pub mod codec;
 pub mod feedback;
 pub mod frame;
+pub mod grid;
 pub mod keys;
 pub mod limits;
 pub mod merge;

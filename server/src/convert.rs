@@ -16,7 +16,8 @@ use toponym_proto::answer::{
     HeardStatus, LabelEntry, LabelsReply, MapIdentity, Particle, Place, PoseState, Reachable, Resolved,
     WhereReply,
 };
-use toponym_proto::{Mend, Message, Pose, Stamp};
+use toponym_proto::grid::png_of;
+use toponym_proto::{Invalid, Mend, Message, Pose, Stamp};
 
 /// A message as the core takes it. A sentence without `began` counts as said at the clock's zero:
 /// the merge has filled it in before.
@@ -238,8 +239,11 @@ fn edge(e: &query::EdgeView) -> Edge {
 }
 
 /// Answer of `ask/grid`.
-pub fn grid_reply(grid: query::Grid, map: MapIdentity) -> GridReply {
-    GridReply {
+///
+/// # Errors
+/// If it can't be made a picture.
+pub fn grid_reply(grid: &query::Grid, map: MapIdentity) -> Result<GridReply, Invalid> {
+    Ok(GridReply {
         v: ANSWER_VERSION,
         query: "grid".into(),
         map,
@@ -247,8 +251,8 @@ pub fn grid_reply(grid: query::Grid, map: MapIdentity) -> GridReply {
         width: grid.width,
         height: grid.height,
         map_from_grid: pose(&grid.map_from_grid),
-        cells: grid.cells,
-    }
+        png: png_of(grid.width, grid.height, &grid.cells)?,
+    })
 }
 
 #[cfg(test)]

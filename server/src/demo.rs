@@ -2,12 +2,11 @@
 //! planner asks where things are.
 
 use crate::config::ServerConfig;
-use crate::map::image;
+use crate::picture::{self, Drawn};
 use crate::serve::Server;
 use anyhow::{Context, Result};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use std::fs::File;
-use std::io::{BufWriter, IsTerminal, Write, stderr};
+use std::io::{IsTerminal, Write, stderr};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tokio::sync::broadcast::Receiver;
@@ -37,8 +36,8 @@ pub struct DemoArgs {
     /// Leave the server running afterwards, to be asked and talked to
     #[arg(long)]
     pub keep: bool,
-    /// Picture to write
-    #[arg(long, value_name = "FILE.png", default_value = "toponym-demo.png")]
+    /// Picture to write, as PNG or SVG by the name's end
+    #[arg(long, value_name = "FILE", default_value = "toponym-demo.png")]
     pub image: PathBuf,
     /// Seed of the wheels', the laser's and the guide's chances
     #[arg(long, value_name = "S", default_value_t = 1)]
@@ -179,27 +178,26 @@ fn way(c: &Candidate) -> String {
 /// Draws what the planner gets to see.
 async fn picture(planner: &Planner, file: &Path) -> Result<()> {
     let graph = graph(planner.graph().await?);
-    let grid = grid(planner.grid(0.05).await?);
+    let grid = grid(&planner.grid(0.05).await?)?;
     let rooms = planner.regions().await?.regions;
     let track: Vec<Pose2> = graph.places.iter().map(|p| p.pose).collect();
-    let out = File::create(file).with_context(|| format!("--image {}", file.display()))?;
-    let mut out = BufWriter::new(out);
-    image::draw(&grid, &graph, &track, &rooms).write_png(&mut out)?;
-    Ok(out.flush()?)
+    let robot = track.last().copied();
+    let drawn = Drawn { grid: &grid, graph: &graph, trajectory: &track, regions: &rooms, robot };
+    picture::draw(&drawn).write(file, "demo").context("--image")
 }
 
 fn pose(p: &Pose) -> Pose2 {
     Pose2::new(p.x_m, p.y_m, p.yaw_rad)
 }
 
-fn grid(reply: GridReply) -> Grid {
-    Grid {
+fn grid(reply: &GridReply) -> Result<Grid> {
+    Ok(Grid {
         resolution_m: reply.resolution_m,
         width: reply.width,
         height: reply.height,
         map_from_grid: pose(&reply.map_from_grid),
-        cells: reply.cells,
-    }
+        cells: reply.cells()?,
+    })
 }
 
 fn graph(reply: GraphReply) -> GraphAnswer {

@@ -5,6 +5,7 @@
 //! - [`serve`]: the mapping server over Zenoh; [`config`]: its settings; [`fold`]: a map as a fold of its journal;
 //!   [`store`]: the journals; [`journals`]: their command line.
 //! - [`map`]: recorded logs through the same core, offline; [`demo`]: all of it at once.
+//! - [`picture`]: maps as PNG and SVG.
 //! - [`access`]: who may do what.
 //! - [`convert`]: between the wire's types and the core's.
 
@@ -15,5 +16,6 @@ pub mod demo;
 pub mod fold;
 pub mod journals;
 pub mod map;
+pub mod picture;
 pub mod serve;
 pub mod store;

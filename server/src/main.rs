@@ -27,6 +27,8 @@ enum Command {
     /// Serve maps over Zenoh
     Serve(ServeArgs),
     Map(Box<map::MapArgs>),
+    Show(map::ShowArgs),
+    Ask(map::AskArgs),
     Demo(demo::DemoArgs),
     Journal(journals::JournalArgs),
     User(UserArgs),
@@ -41,6 +43,11 @@ fn main() -> ExitCode {
             block_on(serve::run(serve))
         }
         Command::Map(map) => map::run(&map),
+        Command::Show(show) => map::show(&show),
+        Command::Ask(ask) => match map::ask(&ask) {
+            Ok(false) => return ExitCode::FAILURE,
+            done => done.map(|_| ()),
+        },
         Command::Journal(journal) => journals::run(&journal),
         Command::User(user) => access::edit_users(&user),
         Command::Cert(cert) => access::make_certificate(&cert),

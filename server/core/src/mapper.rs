@@ -240,7 +240,7 @@ impl Mapper {
         let before = self.map_from_body();
         effects.extend(change(&mut self.filter, &mut self.talk));
         self.rev += 1;
-        self.shared = Shared::default();
+        self.shared = self.shared.anew();
         self.standing.renew();
         if let (Some(old), Some(new)) = (before, self.map_from_body()) {
             self.moved(&old, &new, effects);

@@ -1,7 +1,8 @@
 //! Options of `map`.
 
 use super::trajectory::Format;
-use anyhow::{Result, bail};
+use crate::picture;
+use anyhow::{Context, Result, bail};
 use clap::ValueEnum as _;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -86,8 +87,8 @@ pub struct MapArgs {
     /// Write rooms: outlines, doorways, names
     #[arg(long, value_name = "FILE.json")]
     pub regions: Option<PathBuf>,
-    /// Draw grid, trajectory, edges and names
-    #[arg(long, value_name = "FILE.png")]
+    /// Draw rooms, trajectory, edges and names, as PNG or SVG by the name's end
+    #[arg(long, value_name = "FILE")]
     pub image: Option<PathBuf>,
 }
 
@@ -138,6 +139,7 @@ impl MapArgs {
                 bail!("{option} {}: this is a folder; give a file's name", file.display());
             }
         }
+        self.image.as_deref().map(picture::form).transpose().context("--image")?;
         Ok(())
     }
 }

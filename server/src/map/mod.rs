@@ -1,25 +1,24 @@
 //! `map`: a recorded log through the same core as the server's, as fast as it goes.
 
 mod args;
-mod canvas;
 mod history;
-pub mod image;
 mod play;
 mod progress;
 mod report;
-mod shades;
+mod saved;
 mod summary;
 mod timing;
 mod trajectory;
 
 pub use args::{MapArgs, Preset};
-pub use canvas::Canvas;
 pub use report::build;
+pub use saved::{AskArgs, ShowArgs, ask, show};
 
 use crate::config::words_of;
 use crate::convert::regions_reply;
-use crate::fold::saved_map;
-use anyhow::{Context, Result, anyhow, bail};
+use crate::fold::{Fold, saved_map};
+use crate::picture::{self, Drawn, Sketch};
+use anyhow::{Context, Result, anyhow};
 use history::History;
 use play::Played;
 use progress::Progress;
@@ -30,8 +29,8 @@ use std::time::Instant;
 use timing::{Stage, Timing};
 use toponym::log::{self, Narration, Notes, Records};
 use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
-use toponym_core::{Answer, Event, Mapper, Pose2, Query};
-use toponym_journal::Checkpoint;
+use toponym_core::{Answer, Event, Mapper, Pose2, Query, Snapshot};
+use toponym_journal::{Checkpoint, Folder, Journal, Opened};
 use toponym_proto::answer::MapIdentity;
 
 /// Runs `map`.
@@ -43,7 +42,7 @@ pub fn run(args: &MapArgs) -> Result<()> {
         None => log,
     };
     let mut mapper = match &args.start_map {
-        Some(file) => load(file)?,
+        Some(file) => load(file).context("--start-map")?,
         None => Mapper::on_trial(args.config(), args.trial()),
     };
     if let Some(file) = &args.lexicon {
@@ -61,17 +60,31 @@ pub fn run(args: &MapArgs) -> Result<()> {
     Ok(checked?)
 }
 
+/// A saved map: as a file, as a server's checkpoint, or as the folder of a map in a server's data folder, which is
+/// left as it is.
 fn load(file: &Path) -> Result<Mapper> {
-    let bytes = std::fs::read(file).with_context(|| format!("--start-map {}", file.display()))?;
+    if file.is_dir() {
+        let Opened { checkpoint, tail, .. } =
+            Journal::open(Folder(file.into())).with_context(|| file.display().to_string())?;
+        let mut fold = Fold::load(&checkpoint.map).with_context(|| file.display().to_string())?;
+        for (_, entry) in tail {
+            fold.take(entry, &mut |_| {});
+        }
+        return Ok(fold.mapper);
+    }
+    let bytes = std::fs::read(file).with_context(|| file.display().to_string())?;
     let name = file.file_name().unwrap_or_default().to_string_lossy();
     let map = if Checkpoint::is_one(&bytes) {
-        let checkpoint = Checkpoint::read(&name, &bytes).context("--start-map")?;
+        let checkpoint = Checkpoint::read(&name, &bytes)?;
         saved_map(&checkpoint.map).unwrap_or_default().to_vec()
     } else {
         bytes
     };
     Mapper::load(&map).with_context(|| {
-        format!("--start-map {}: give a file that --save-map wrote, or a server's checkpoint", file.display())
+        format!(
+            "{}: give a file that --save-map wrote, a server's checkpoint, or a map's folder in its data folder",
+            file.display()
+        )
     })
 }
 
@@ -105,7 +118,7 @@ fn play(mut log: Box<dyn Records>, mapper: Mapper, args: &MapArgs) -> Result<Fin
     played.flush();
     played.history.take().map_or(Ok(()), History::finish)?;
     progress.finish();
-    let answers = args.ask.iter().filter_map(|text| ask(&mut played, text)).collect();
+    let answers = args.ask.iter().filter_map(|text| asked(&mut played, text)).collect();
     let graph = played.mapper.snapshot().graph();
     let trajectory = played.trajectory(&graph);
     let wall_s = began.elapsed().as_secs_f64();
@@ -127,7 +140,7 @@ fn play(mut log: Box<dyn Records>, mapper: Mapper, args: &MapArgs) -> Result<Fin
     Ok(Finished { played, saved, graph, trajectory, answers, notes, robot, timing })
 }
 
-fn ask(played: &mut Played, text: &str) -> Option<WhereAnswer> {
+fn asked(played: &mut Played, text: &str) -> Option<WhereAnswer> {
     let began = Instant::now();
     let answer = played.mapper.answer(&Query::Where { text: text.into(), lang: None });
     played.stopwatch.add(Stage::Answer, began.elapsed());
@@ -151,8 +164,8 @@ impl Finished {
             write_json(&reply.regions, file).with_context(|| format!("--regions {}", file.display()))?;
         }
         if let Some(file) = &args.image {
-            draw(&self.played.mapper, &self.trajectory, file)
-                .with_context(|| format!("--image {}", file.display()))?;
+            let title = args.log.display().to_string();
+            drawn(&self.played.mapper.snapshot(), &self.trajectory).write(file, &title).context("--image")?;
         }
         said(std::io::stdout().write_all(summary::text(args, &self).as_bytes()))?;
         let Some(file) = &args.report else { return Ok(()) };
@@ -177,9 +190,8 @@ fn write_json<T: serde::Serialize>(value: &T, file: &Path) -> Result<()> {
     Ok(out.flush()?)
 }
 
-/// Draws a mapper's map into a PNG.
-fn draw(mapper: &Mapper, trajectory: &[Pose2], file: &Path) -> Result<()> {
-    let snapshot = mapper.snapshot();
+/// The picture of a map.
+fn drawn(snapshot: &Snapshot, trajectory: &[Pose2]) -> Sketch {
     let graph = snapshot.graph();
     let poses = || trajectory.iter().chain(graph.places.iter().map(|p| &p.pose));
     let span = |f: fn(&Pose2) -> f64| {
@@ -188,12 +200,10 @@ fn draw(mapper: &Mapper, trajectory: &[Pose2], file: &Path) -> Result<()> {
         (high - low).max(0.0)
     };
     let extent_m = span(|p| p.x_m).max(span(|p| p.y_m));
-    let query = Query::Grid { resolution_m: image::resolution_m(extent_m) };
-    let Answer::Grid(grid) = snapshot.answer(&query) else { bail!("the map has no grid to draw") };
-    let mut out = BufWriter::new(File::create(file)?);
-    let regions = regions_reply(&snapshot, MapIdentity::default()).regions;
-    image::draw(&grid, &graph, trajectory, &regions).write_png(&mut out)?;
-    Ok(out.flush()?)
+    let grid = snapshot.grid(picture::resolution_m(extent_m));
+    let regions = regions_reply(snapshot, MapIdentity::default()).regions;
+    let robot = snapshot.robot();
+    picture::draw(&Drawn { grid: &grid, graph: &graph, trajectory, regions: &regions, robot })
 }
 
 #[cfg(test)]

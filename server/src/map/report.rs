@@ -248,7 +248,7 @@ fn particle(p: &toponym_core::answers::query::ParticleView) -> Particle {
     Particle { weight: p.weight, edges: edges.collect(), poses: poses.collect() }
 }
 
-fn answer(a: WhereAnswer, robot: &str) -> Answer {
+pub fn answer(a: WhereAnswer, robot: &str) -> Answer {
     // As on the wire, without what says of which map it is.
     let reply = convert::where_reply(a, MapIdentity::default(), Stamp::default(), robot);
     Answer {

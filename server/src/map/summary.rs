@@ -4,7 +4,7 @@ use super::{Finished, MapArgs, trajectory};
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 use toponym_core::answers::differences::sentence;
-use toponym_core::answers::query::WhereAnswer;
+use toponym_core::answers::query::{GraphAnswer, WhereAnswer};
 use toponym_core::edge::EdgeKind;
 use toponym_core::effects::{HeardStatus, TrackState};
 
@@ -63,27 +63,30 @@ pub fn text(args: &MapArgs, done: &Finished) -> String {
 }
 
 fn map(done: &Finished) -> String {
-    let best = done.graph.particles.first();
-    let mut kinds: BTreeMap<EdgeKind, usize> = BTreeMap::new();
-    for edge in best.iter().flat_map(|p| &p.edges) {
-        *kinds.entry(edge.kind).or_default() += 1;
-    }
-    let count = |kind| kinds.get(&kind).copied().unwrap_or(0);
     format!(
-        "{} places on {:.0} m; loop edges: {} distance, {} semantic, {} relocalisation; \
-         best of {} graphs, weight {:.2}{}",
+        "{} places on {:.0} m; loop edges: {}; best of {} graphs, weight {:.2}{}",
         done.graph.places.len(),
         trajectory::path_m(&done.trajectory),
-        count(EdgeKind::Distance),
-        count(EdgeKind::Semantic),
-        count(EdgeKind::Relocalisation),
+        edges(&done.graph),
         done.graph.particles.len(),
-        best.map_or(0.0, |p| p.weight),
+        done.graph.particles.first().map_or(0.0, |p| p.weight),
         dropped(done.graph.unresolved),
     )
 }
 
-fn dropped(unresolved: f64) -> String {
+/// How many loop edges of each kind the best graph has.
+pub fn edges(graph: &GraphAnswer) -> String {
+    let mut kinds: BTreeMap<EdgeKind, usize> = BTreeMap::new();
+    for edge in graph.particles.first().iter().flat_map(|p| &p.edges) {
+        *kinds.entry(edge.kind).or_default() += 1;
+    }
+    let count = |kind| kinds.get(&kind).copied().unwrap_or(0);
+    let [distance, semantic] = [EdgeKind::Distance, EdgeKind::Semantic].map(count);
+    format!("{distance} distance, {semantic} semantic, {} relocalisation", count(EdgeKind::Relocalisation))
+}
+
+/// What to add of graphs that were dropped.
+pub fn dropped(unresolved: f64) -> String {
     if unresolved < 0.005 { String::new() } else { format!(", {unresolved:.2} in graphs that were dropped") }
 }
 

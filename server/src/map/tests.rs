@@ -220,3 +220,43 @@ fn a_closed_pipe_is_no_error() {
     assert!(super::said(Err(Error::from(ErrorKind::BrokenPipe))).is_ok());
     assert!(super::said(Err(Error::from(ErrorKind::StorageFull))).is_err());
 }
+
+#[derive(Parser)]
+struct AskCli {
+    #[command(flatten)]
+    ask: AskArgs,
+}
+
+#[derive(Parser)]
+struct ShowCli {
+    #[command(flatten)]
+    show: ShowArgs,
+}
+
+#[test]
+fn a_saved_map_is_shown_and_asked_without_its_log() {
+    let folder = Folder::new("shown");
+    folder.map(&["--save-map", "@m", "--image", "@a.svg"]).unwrap();
+    let path = |name: &str| folder.0.join(name).display().to_string();
+    let ask = |question: &str| ask(&AskCli::parse_from(["ask", &path("m"), question]).ask).unwrap();
+    assert_eq!((ask("gym"), ask("where is the pool")), (true, false));
+    let show = |options: &[&str]| {
+        let all = ["show".to_owned(), path("m")];
+        let options = options.iter().map(|o| o.strip_prefix('@').map_or((*o).to_owned(), path));
+        show(&ShowCli::parse_from(all.into_iter().chain(options)).show)
+    };
+    show(&["--image", "@b.svg", "--regions", "@r.json"]).unwrap();
+    let text = std::fs::read_to_string(folder.0.join("b.svg")).unwrap();
+    let picture = roxmltree::Document::parse(&text).unwrap();
+    let words: Vec<&str> = picture
+        .descendants()
+        .filter(|n| n.has_tag_name("text"))
+        .filter_map(|n| n.text())
+        .map(str::trim)
+        .collect();
+    assert!(words.iter().any(|w| w.starts_with("gym")), "{words:?}");
+    assert!(folder.report("r.json").as_array().is_some_and(|rooms| !rooms.is_empty()));
+    assert!(show(&["--image", "@b.jpg"]).unwrap_err().to_string().contains("--image"));
+    assert!(show(&["@m", "--image", "@b.png"]).is_err(), "one picture of two maps");
+    assert!(folder.error(&["--image", "@a.gif"]).contains(".png or .svg"));
+}

@@ -287,8 +287,8 @@ fn reply_to(board: &Board, query: &Query) {
     }
     for key in keys {
         match queries::answer(board, &key, parameters, &payload) {
-            Ok(json) => {
-                if let Err(e) = query.reply(&key, json).encoding(ENCODING_JSON).express(true).wait() {
+            Ok(queries::Reply { payload, encoding }) => {
+                if let Err(e) = query.reply(&key, payload).encoding(encoding).express(true).wait() {
                     warn!(key, "could not reply: {e}");
                 }
             }

@@ -8,9 +8,10 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use toponym_core::{Answer, Query};
 use toponym_proto::answer::{ANSWER_VERSION, Clocks, Done, ErrorCode, Mended, Problem, RobotState};
+use toponym_proto::codec::{ENCODING_JSON, ENCODING_PNG};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
-use toponym_proto::{Limits, Mend, Message, Stamp};
+use toponym_proto::{Invalid, Limits, Mend, Message, Stamp};
 
 use super::arguments::{asked, check_localised, check_robot, known, point, resolution_m, take, understood};
 use super::board::{Board, MapView, lock};
@@ -67,8 +68,22 @@ impl Permits {
     }
 }
 
-/// Answers one query on a key without wildcards, as JSON.
-pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Result<Vec<u8>, Problem> {
+/// An answer as it goes out.
+pub struct Reply {
+    /// Its bytes.
+    pub payload: Vec<u8>,
+    /// What they are.
+    pub encoding: &'static str,
+}
+
+impl Reply {
+    fn json(payload: Vec<u8>) -> Self {
+        Self { payload, encoding: ENCODING_JSON }
+    }
+}
+
+/// Answers one query on a key without wildcards.
+pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Result<Reply, Problem> {
     let arguments = selector::decode(parameters, payload)?;
     match board.keys.chunks(key).unwrap_or_default().as_slice() {
         ["info"] => info(board, &arguments),
@@ -93,11 +108,13 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
         }
         ["map", id, "out", "graph"] => {
             let map = map(board, id)?;
-            graph(&map)
+            graph(&map).map(Reply::json)
         }
-        ["robot" | "map", _, "out", _] => lock(&board.latest).get(key).cloned().ok_or_else(|| {
-            Problem::new(ErrorCode::NoSuchQuery, format!("nothing was published on {key} yet"))
-        }),
+        ["robot" | "map", _, "out", _] => {
+            lock(&board.latest).get(key).cloned().map(Reply::json).ok_or_else(|| {
+                Problem::new(ErrorCode::NoSuchQuery, format!("nothing was published on {key} yet"))
+            })
+        }
         _ => Err(no_such_query(key).hint("keys are listed in proto/PROTOCOL.md")),
     }
 }
@@ -122,11 +139,11 @@ fn map(board: &Board, id: &str) -> Result<Arc<MapView>, Problem> {
     })
 }
 
-fn json<T: Serialize>(value: &T) -> Result<Vec<u8>, Problem> {
-    serde_json::to_vec(value).map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))
+fn json<T: Serialize>(value: &T) -> Result<Reply, Problem> {
+    serde_json::to_vec(value).map(Reply::json).map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))
 }
 
-fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Reply, Problem> {
     let snapshot = map.snapshot.load_full();
     let identity = map.identity(&snapshot);
     let query = match ask {
@@ -162,30 +179,46 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Vec<u8>
             let [] = take(arguments, [])?;
             return json(&convert::regions_reply(&snapshot, identity));
         }
-        Ask::Grid => {
-            let [resolution] = take(arguments, ["resolution_m"])?;
-            Query::Grid { resolution_m: resolution.map_or(Ok(RESOLUTION_DEFAULT_M), |r| resolution_m(&r))? }
-        }
+        Ask::Grid => return grid(map, arguments),
     };
     match (ask, snapshot.answer(&query)) {
         (Ask::Labels, Answer::Labels(a)) => json(&convert::labels_reply(a, identity)),
         (Ask::Graph, Answer::Graph(a)) => json(&convert::graph_reply(a, identity)),
-        (Ask::Grid, Answer::Grid(a)) => json(&convert::grid_reply(a, identity)),
         _ => Err(Problem::new(ErrorCode::Internal, "the map answered another question")),
+    }
+}
+
+/// The grid of a map: as JSON, or as a picture alone.
+fn grid(map: &MapView, arguments: Arguments) -> Result<Reply, Problem> {
+    let [resolution, format] = take(arguments, ["resolution_m", "format"])?;
+    let resolution_m = resolution.map_or(Ok(RESOLUTION_DEFAULT_M), |r| resolution_m(&r))?;
+    let snapshot = map.snapshot.load_full();
+    let grid = snapshot.grid(resolution_m);
+    let internal = |e: Invalid| Problem::new(ErrorCode::Internal, e.to_string());
+    let reply = convert::grid_reply(&grid, map.identity(&snapshot)).map_err(internal)?;
+    match format.as_deref() {
+        None | Some("json") => json(&reply),
+        Some("png") if reply.png.is_empty() => {
+            Err(Problem::new(ErrorCode::BadArgument, "the map has seen nothing to draw yet").field("format"))
+        }
+        Some("png") => Ok(Reply { payload: reply.picture().map_err(internal)?, encoding: ENCODING_PNG }),
+        Some(other) => Err(Problem::new(ErrorCode::BadArgument, format!("there is no format {other:?}"))
+            .field("format")
+            .hint("json or png")),
     }
 }
 
 /// The graph of a map, as asked and as published.
 pub fn graph(map: &MapView) -> Result<Vec<u8>, Problem> {
-    answer_about(map, Ask::Graph, Arguments::new())
+    answer_about(map, Ask::Graph, Arguments::new()).map(|reply| reply.payload)
 }
 
-fn info(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
+fn info(board: &Board, arguments: &Arguments) -> Result<Reply, Problem> {
     let [] = take(arguments.clone(), [])?;
     json(&watch::info(board))
 }
 
-fn time(board: &Board, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+fn time(board: &Board, arguments: Arguments) -> Result<Reply, Problem> {
     let [] = take(arguments, [])?;
     let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
     let newest = |(id, state): (&String, &RobotState)| Some((id.clone(), state.newest?));
@@ -197,7 +230,7 @@ fn time(board: &Board, arguments: Arguments) -> Result<Vec<u8>, Problem> {
 }
 
 /// `do/save?map=…`, or all maps.
-fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
+fn save(board: &Board, arguments: &Arguments) -> Result<Reply, Problem> {
     let [id] = take(arguments.clone(), ["map"])?;
     let maps = match id {
         Some(id) => save_maps(vec![map(board, &id)?])?,
@@ -207,7 +240,7 @@ fn save(board: &Board, arguments: &Arguments) -> Result<Vec<u8>, Problem> {
 }
 
 /// `do/delete?map=…`.
-fn delete(board: &Board, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+fn delete(board: &Board, arguments: Arguments) -> Result<Reply, Problem> {
     let [id] = take(arguments, ["map"])?;
     let missing = || Problem::new(ErrorCode::BadArgument, "map is missing").field("map");
     let (map, (reply, done)) = (id.ok_or_else(missing)?, sync_channel(1));
@@ -239,7 +272,7 @@ fn save_maps(maps: Vec<Arc<MapView>>) -> Result<Vec<String>, Problem> {
 }
 
 /// `do/undo?id=…`, `do/rename?from=…;to=…`, `do/forget?name=…`, each with `map=…` where there are several.
-fn mend(board: &Board, command: &str, arguments: Arguments) -> Result<Vec<u8>, Problem> {
+fn mend(board: &Board, command: &str, arguments: Arguments) -> Result<Reply, Problem> {
     let given = |field: &str, value: Option<String>| {
         value.ok_or_else(|| Problem::new(ErrorCode::BadArgument, format!("{field} is missing")).field(field))
     };

@@ -1,6 +1,7 @@
 //! The command line: arguments, exit codes, and one function per command.
 
 mod find;
+mod grid;
 mod mend;
 mod play;
 mod status;
@@ -48,6 +49,7 @@ Try, with `toponym-server serve` running in another terminal:
   toponym what                                   what is the room called where the robot is?
   toponym nearest restroom                       which one is nearest by the way there?
   toponym rooms                                  how large, what called, where do they lead?
+  toponym grid map.png                           what stands where, as a picture
   toponym say 'this is the workshop'             teach it another name
 
 Exit codes: 0 found, 1 not known, 2 usage, 3 no server, 4 timeout, 5 refused."
@@ -116,6 +118,8 @@ enum Command {
     Nearest(find::WhereArgs),
     /// List the rooms: how large, what they are called, where they lead.
     Rooms(find::AskedArgs),
+    /// Write what stands where as a picture.
+    Grid(grid::GridArgs),
     /// Take a sentence back.
     Undo(mend::UndoArgs),
     /// Give a misheard name its right spelling.
@@ -187,6 +191,7 @@ async fn done(args: &Args) -> Result<u8, Failure> {
         Command::What(asked) => find::what(&to, &args.site, asked).await,
         Command::Nearest(asked) => find::nearest(&to, &args.site, asked).await,
         Command::Rooms(asked) => find::rooms(&to, &args.site, asked).await,
+        Command::Grid(grid) => grid::grid(&to, &args.site, grid).await,
         Command::Undo(undo) => mend::undo(&to, &args.site, undo).await,
         Command::Rename(rename) => mend::rename(&to, &args.site, rename).await,
         Command::Forget(forget) => mend::forget(&to, &args.site, forget).await,

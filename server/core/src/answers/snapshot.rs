@@ -17,12 +17,12 @@ use crate::graph::Place;
 use crate::language::act::{About, Act, Head, Question};
 use crate::language::{Content, GroundPlace, Name, Speech};
 use crate::regions::Rooms;
-use crate::regions::occupancy::grid;
+use crate::regions::occupancy::{Plot, grid};
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::places::OpenPlace;
 use std::collections::BTreeMap;
-use std::sync::{Arc, OnceLock};
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Names told of a place.
 const NAMES_MAX: usize = 5;
@@ -52,12 +52,19 @@ pub(crate) struct Shared {
     rooms: Arc<OnceLock<Arc<Rooms>>>,
     /// Of one posterior and the places that it has, not frozen ones too.
     named: Arc<OnceLock<Named>>,
+    /// Of the posterior that was asked last: what follows differs little.
+    plot: Arc<Mutex<Option<Plot>>>,
 }
 
 impl Shared {
     /// The same posterior with one more place that is not frozen.
     pub fn with_place(&self) -> Self {
-        Self { rooms: self.rooms.clone(), named: Arc::default() }
+        Self { named: Arc::default(), ..self.clone() }
+    }
+
+    /// Another posterior.
+    pub fn anew(&self) -> Self {
+        Self { plot: self.plot.clone(), ..Self::default() }
     }
 }
 
@@ -140,19 +147,21 @@ impl Snapshot {
         }
     }
 
-    /// Occupancy grid of the best particle.
+    /// Occupancy grid of the best particle, as far as anything is known.
     pub fn grid(&self, resolution_m: f64) -> Grid {
-        let posed: Vec<(Pose2, Arc<Place>)> =
-            self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
-        grid(&posed, resolution_m)
+        grid(&self.posed(), resolution_m)
+    }
+
+    fn posed(&self) -> Vec<(Pose2, Arc<Place>)> {
+        self.poses.iter().copied().zip(self.places.iter().cloned()).collect()
     }
 
     /// Regions of the best graph: made when first asked for, for all snapshots of one posterior together.
     pub fn rooms(&self) -> &Arc<Rooms> {
         self.shared.rooms.get_or_init(|| {
-            let posed: Vec<(Pose2, Arc<Place>)> =
-                self.poses.iter().copied().zip(self.places.iter().cloned()).collect();
-            Arc::new(Rooms::new(&posed))
+            // Whatever state a panic left it in: it follows from any.
+            let mut plot = self.shared.plot.lock().unwrap_or_else(PoisonError::into_inner);
+            Arc::new(Rooms::new(plot.get_or_insert_with(Rooms::plot), &self.posed()))
         })
     }
 

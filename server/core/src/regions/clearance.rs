@@ -6,23 +6,29 @@ use super::raster::Raster;
 /// Metres to the nearest cell that is not free; 0 there. The raster's edge is not free.
 pub fn clearance(raster: &Raster) -> Vec<f32> {
     let (width, height) = (raster.width, raster.height);
-    let far = ((width + height) * (width + height)) as f64;
-    let mut squared: Vec<f64> = raster.free.iter().map(|&free| if free { far } else { 0.0 }).collect();
+    // Along its column, cells: down, then up.
+    let mut far: Vec<u32> = raster.free.iter().map(|&free| free.into()).collect();
+    for cell in width..far.len() {
+        far[cell] *= far[cell - width] + 1;
+    }
+    for cell in (0..far.len()).rev() {
+        let below = if cell / width + 1 < height { far[cell + width] } else { 0 };
+        far[cell] = far[cell].min(below + 1);
+    }
     let mut line = Envelope::default();
-    let mut column = vec![0.0; height];
-    for x in 0..width {
-        for y in 0..height {
-            column[y] = squared[y * width + x];
-        }
-        line.lower(&mut column);
-        for y in 0..height {
-            squared[y * width + x] = column[y];
+    let (mut squared, mut clearance) = (Vec::new(), Vec::with_capacity(far.len()));
+    for row in far.chunks_exact(width) {
+        // What lies behind what is not free changes nothing.
+        for run in row.chunk_by(|a, b| (*a > 0) == (*b > 0)) {
+            squared.clear();
+            squared.extend(run.iter().map(|&far| f64::from(far).powi(2)));
+            if run[0] > 0 {
+                line.lower(&mut squared);
+            }
+            clearance.extend(squared.iter().map(|d| (d.sqrt() * raster.resolution_m) as f32));
         }
     }
-    for row in squared.chunks_exact_mut(width) {
-        line.lower(row);
-    }
-    squared.into_iter().map(|d| (d.sqrt() * raster.resolution_m) as f32).collect()
+    clearance
 }
 
 /// The lower envelope of parabolas along a line.

@@ -1,8 +1,8 @@
 //! Regions: the parts of a map that people would call rooms, by the narrowings of its free space.
 //!
 //! ```text
-//! places, poses ─ raster ─▶ free cells ─ clearance ─▶ distance to what stands there
-//!               ─ basins ─▶ parts that narrowings part ─ outline ─▶ polygons, doorways
+//! places, poses ─ occupancy ─▶ counts ─ raster ─▶ free cells ─ clearance ─▶ distance to what stands there
+//!               ─ basins ─▶ parts that narrowings part ─ niches ─▶ with their corners ─ outline ─▶ polygons, doorways
 //! ```
 //!
 //! Clearance is highest in the midst of a room and has a saddle in each doorway. Two parts are one where the saddle
@@ -10,14 +10,17 @@
 
 mod basins;
 mod clearance;
+mod niches;
 pub mod occupancy;
 mod outline;
 mod raster;
 mod reach;
 #[cfg(test)]
 mod tests;
+mod tiles;
 
 use self::basins::{Parts, Saddle};
+use self::occupancy::Plot;
 use self::raster::Raster;
 pub use self::reach::{FOOTPRINT_M, Goal};
 use crate::edge::{PlaceId, Vertex};
@@ -100,9 +103,10 @@ struct Floor {
 }
 
 impl Rooms {
-    /// Of places with their poses in the map, oldest first.
-    pub fn new(places: &[(Pose2, Arc<Place>)]) -> Self {
-        let Some(raster) = Raster::new(places) else { return Self::default() };
+    /// Of places with their poses in the map, oldest first; `plot` is of these or of others, best of nearly the same.
+    pub fn new(plot: &mut Plot, places: &[(Pose2, Arc<Place>)]) -> Self {
+        plot.follow(places);
+        let Some(raster) = Raster::new(plot) else { return Self::default() };
         let clearance = clearance::clearance(&raster);
         let mut parts = basins::basins(&raster, &clearance);
         let mut within: Vec<Vec<Vertex>> = vec![Vec::new(); parts.cells.len()];
@@ -111,6 +115,7 @@ impl Rooms {
                 within[part as usize].push(v as Vertex);
             }
         }
+        niches::take_up_niches(&raster, &mut parts, &|part| !within[part as usize].is_empty());
         // Those that were seen through a door alone are none yet.
         let mut index = vec![None; parts.cells.len()];
         for (n, part) in (0..parts.cells.len()).filter(|&part| !within[part].is_empty()).enumerate() {
@@ -143,6 +148,11 @@ impl Rooms {
         let drivable = reach::drivable(&raster, &clearance, places);
         let floor = Floor { raster, clearance, of: parts.of, cells, drivable };
         Self { regions, unentered, floor: Some(floor) }
+    }
+
+    /// What to keep from one map to the next: of nothing yet.
+    pub fn plot() -> Plot {
+        Plot::new(raster::RESOLUTION_M)
     }
 
     /// Regions drawn by hand, without their cells.

@@ -1,14 +1,9 @@
 //! What is free, by all that the places of a map have seen.
 
-use super::occupancy::grid;
-use crate::geometry::Pose2;
-use crate::graph::Place;
-use std::sync::Arc;
+use super::occupancy::{Plot, is_free};
 
 /// Edge of a cell: walls are thicker, doorways far wider.
-const RESOLUTION_M: f64 = 0.1;
-/// From such a percentage on something stands there.
-const OCCUPIED: i8 = 50;
+pub const RESOLUTION_M: f64 = 0.1;
 /// What stands free and is smaller, people and pillars say, parts no space.
 const CLUTTER_M2: f64 = 0.5;
 /// A place lies in what is free so near to it.
@@ -27,12 +22,18 @@ pub struct Raster {
 
 impl Raster {
     /// None of a map that has seen nothing.
-    pub fn new(places: &[(Pose2, Arc<Place>)]) -> Option<Self> {
-        let grid = grid(places, RESOLUTION_M);
-        let free: Vec<bool> = grid.cells.iter().map(|&c| (0..OCCUPIED).contains(&c)).collect();
-        let corner_m = (grid.map_from_grid.x_m, grid.map_from_grid.y_m);
-        let (width, height, resolution_m) = (grid.width, grid.height, grid.resolution_m);
-        let mut raster = Self { width, height, resolution_m, corner_m, free };
+    pub fn new(plot: &Plot) -> Option<Self> {
+        let [low, high] = plot.tiles().bounds()?;
+        let resolution_m = plot.resolution_m();
+        // A free cell at the edge has one beside it that is not.
+        let (width, height) = ((high.0 - low.0 + 3) as usize, (high.1 - low.1 + 3) as usize);
+        let mut free = vec![false; width * height];
+        for (x, y, _) in plot.tiles().known().filter(|(_, _, count)| is_free(count)) {
+            free[(y - low.1 + 1) as usize * width + (x - low.0 + 1) as usize] = true;
+        }
+        let corner_m = |cell: i32| f64::from(cell - 1) * resolution_m;
+        let mut raster =
+            Self { width, height, resolution_m, corner_m: (corner_m(low.0), corner_m(low.1)), free };
         raster.clear();
         raster.free.contains(&true).then_some(raster)
     }
@@ -53,24 +54,36 @@ impl Raster {
     fn clear(&mut self) {
         let small = (CLUTTER_M2 / self.resolution_m.powi(2)) as usize;
         let mut seen = self.free.clone();
-        for first in 0..seen.len() {
-            if std::mem::replace(&mut seen[first], true) {
+        let mut is_large = vec![false; seen.len()];
+        let (mut thing, mut small_things) = (Vec::new(), Vec::new());
+        // What has free space all around has some to its left.
+        for first in (1..seen.len()).filter(|&cell| self.free[cell - 1]) {
+            if is_large[first] || std::mem::replace(&mut seen[first], true) {
                 continue;
             }
-            let (mut thing, mut at) = (vec![first], 0);
-            while at < thing.len() {
+            thing.clear();
+            thing.push(first);
+            let (mut at, mut large) = (0, false);
+            while at < thing.len() && !large {
                 for next in self.beside(thing[at], true) {
+                    large |= is_large[next];
                     if !std::mem::replace(&mut seen[next], true) {
                         thing.push(next);
                     }
                 }
                 at += 1;
+                large |= thing.len() > small;
             }
-            if thing.len() <= small {
-                for cell in thing {
-                    self.free[cell] = true;
-                }
+            if !large {
+                small_things.extend_from_slice(&thing);
+                continue;
             }
+            for &cell in &thing {
+                (seen[cell], is_large[cell]) = (false, true);
+            }
+        }
+        for cell in small_things {
+            self.free[cell] = true;
         }
     }
 

@@ -1,14 +1,26 @@
 //! Rooms drawn by hand, and brute force as the oracle of what is clever.
 
+use super::Rooms;
 use super::basins::{Parts, basins};
 use super::clearance::clearance;
+use super::occupancy::grid;
 use super::outline::{doubled_area, loops, outline};
 use super::raster::Raster;
 use super::reach::drivable;
+use crate::event::{Laser, Scan};
+use crate::geometry::Pose2;
+use crate::graph::Place;
+use crate::scan::place::Content;
+use crate::scan::sweep::sweep;
+use crate::scan::view::View;
+use crate::track::places::Chain;
+use nalgebra::Matrix3;
 use proptest::prelude::*;
+use std::f64::consts::TAU;
+use std::sync::Arc;
 
 /// A raster of free rectangles: from x, y on, so wide and so high, cells of 0.1 m.
-fn raster(width: usize, height: usize, rooms: &[(usize, usize, usize, usize)]) -> Raster {
+pub fn raster(width: usize, height: usize, rooms: &[(usize, usize, usize, usize)]) -> Raster {
     let mut free = vec![false; width * height];
     for &(x, y, w, h) in rooms {
         for row in y..y + h {
@@ -18,7 +30,7 @@ fn raster(width: usize, height: usize, rooms: &[(usize, usize, usize, usize)]) -
     Raster { width, height, resolution_m: 0.1, corner_m: (0.0, 0.0), free }
 }
 
-fn parts(raster: &Raster) -> (Parts, Vec<f32>) {
+pub fn parts(raster: &Raster) -> (Parts, Vec<f32>) {
     let clearance = clearance(raster);
     (basins(raster, &clearance), clearance)
 }
@@ -41,6 +53,26 @@ fn rooms_end_at_their_doors() {
     for s in &parts.saddles {
         assert!((2.0 * clearance[s.cell] - 0.9).abs() < 0.25, "{}", clearance[s.cell]);
     }
+}
+
+#[test]
+fn a_map_too_large_for_its_cells_has_larger_ones() {
+    let posed =
+        |x_m: f64| vec![(Pose2::default(), place(0, 3.0)), (Pose2::new(x_m, x_m, 0.0), place(1, 3.0))];
+    let mut plot = Rooms::plot();
+    plot.follow(&posed(1_000_000.0));
+    assert!(plot.resolution_m() > 200.0, "{}", plot.resolution_m());
+    plot.follow(&posed(10.0));
+    assert_eq!(plot.grid(), grid(&posed(10.0), 0.1));
+    let room = grid(&posed(0.0)[..1], 0.1);
+    let count = |wanted: fn(i8) -> bool| room.cells.iter().filter(|&&cell| wanted(cell)).count();
+    assert!(
+        (60..64).contains(&room.width) && (60..64).contains(&room.height),
+        "{} {}",
+        room.width,
+        room.height
+    );
+    assert!(count(|cell| cell > 50) >= 80 && count(|cell| (0..50).contains(&cell)) > 2000);
 }
 
 #[test]
@@ -85,7 +117,73 @@ fn area(line: &[(f64, f64)]) -> f64 {
     pairs.map(|(a, b)| 0.5 * (a.0 * b.1 - a.1 * b.0)).sum()
 }
 
+/// A place in the middle of a square room with walls so far away.
+fn place(k: usize, wall_m: f64) -> Arc<Place> {
+    let laser = Laser {
+        id: "front".into(),
+        body_from_laser: Pose2::new(0.1, 0.0, 0.0),
+        upside_down: false,
+        range_min_m: 0.1,
+        range_max_m: 20.0,
+        ignored_rad: vec![],
+    };
+    let ray = |n: u32| {
+        let bearing = f64::from(n) * TAU / 90.0;
+        (wall_m / bearing.cos().abs().max(bearing.sin().abs())) as f32
+    };
+    let scan = Scan {
+        robot: "r".into(),
+        laser: "front".into(),
+        stamp_ns: 0,
+        angle_min_rad: 0.0,
+        angle_increment_rad: TAU / 90.0,
+        time_increment_s: 0.0,
+        ranges_m: (0..90).map(ray).collect(),
+    };
+    let seen = sweep(&scan, &laser, |_| Pose2::default());
+    let view = View { place_from_laser: laser.body_from_laser, image: seen.image };
+    Arc::new(Place {
+        id: k as u64,
+        stamp_ns: 0,
+        path_m: k as f64,
+        front_from_place: Pose2::default(),
+        segment: 0,
+        chain: Chain {
+            previous_from_this: Pose2::default(),
+            information: Matrix3::identity(),
+            broken: false,
+            unseen: false,
+            failed: 0.0,
+        },
+        content: Content { cloud: seen.points, views: vec![view], sample: vec![] },
+    })
+}
+
+/// Whether a place is there at all, and where.
+fn whereabouts() -> impl Strategy<Value = Vec<(f64, f64, f64)>> {
+    prop::collection::vec((-20.0..20.0, -20.0..20.0, -3.0..3.0), 0..7)
+}
+
 proptest! {
+    #[test]
+    fn a_plot_that_followed_is_as_one_that_began_there(
+        maps in prop::collection::vec((whereabouts(), any::<u8>()), 1..5),
+    ) {
+        let places: Vec<Arc<Place>> = (0..7).map(|k| place(k, 1.5 + k as f64)).collect();
+        let mut plot = Rooms::plot();
+        let mut before: Vec<Pose2> = Vec::new();
+        for (poses, stay) in maps {
+            let pose = |(k, &(x, y, yaw)): (usize, &(f64, f64, f64))| match before.get(k) {
+                Some(old) if stay >> k & 1 == 1 => *old,
+                _ => Pose2::new(x, y, yaw),
+            };
+            before = poses.iter().enumerate().map(pose).collect();
+            let posed: Vec<_> = before.iter().copied().zip(places.iter().cloned()).collect();
+            plot.follow(&posed);
+            prop_assert_eq!(plot.grid(), grid(&posed, 0.1));
+        }
+    }
+
     #[test]
     fn clearance_is_the_distance_to_the_nearest_cell_that_is_not_free(
         free in prop::collection::vec(prop::bool::weighted(0.8), 7 * 9),

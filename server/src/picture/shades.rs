@@ -23,7 +23,8 @@ pub fn shades(grid: &Grid, regions: &[Region]) -> Vec<Option<Rgb888>> {
     let mut own: BTreeMap<u64, usize> = BTreeMap::new();
     for (k, region) in regions.iter().enumerate() {
         let near = |shade: &usize| region.doorways.iter().any(|d| own.get(&d.to) == Some(shade));
-        let shade = (0..SHADES.len()).find(|shade| !near(shade)).unwrap_or(k % SHADES.len());
+        let turn = (0..SHADES.len()).map(|n| (k + n) % SHADES.len());
+        let shade = turn.clone().find(|shade| !near(shade)).unwrap_or(k % SHADES.len());
         own.insert(region.id, shade);
         fill(grid, region, SHADES[shade], &mut cells);
     }

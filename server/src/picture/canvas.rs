@@ -31,6 +31,15 @@ impl Canvas {
         let Ok(()) = self.fill_solid(&area, colour);
     }
 
+    /// Lays another on it, corner on corner.
+    pub fn lay(&mut self, other: &Self) {
+        let (own, width) = (self.size.width as usize * 3, other.size.width.min(self.size.width) as usize * 3);
+        let rows = other.rgb.chunks_exact(other.size.width.max(1) as usize * 3);
+        for (to, from) in self.rgb.chunks_exact_mut(own.max(1)).zip(rows) {
+            to[..width].copy_from_slice(&from[..width]);
+        }
+    }
+
     /// Draws a line, one or more pixels wide.
     pub fn line(&mut self, a: Point, b: Point, colour: Rgb888, width: u32) {
         let Ok(()) = Line::new(a, b).into_styled(PrimitiveStyle::with_stroke(colour, width)).draw(self);
