@@ -5,7 +5,7 @@
 //! - [`serve`]: the mapping server over Zenoh; [`config`]: its settings; [`fold`]: a map as a fold of its journal;
 //!   [`store`]: the journals; [`journals`]: their command line.
 //! - [`map`]: recorded logs through the same core, offline; [`demo`]: all of it at once.
-//! - [`picture`]: maps as PNG and SVG.
+//! - [`picture`]: maps as PNG and SVG; [`export`]: in the forms of others.
 //! - [`access`]: who may do what.
 //! - [`convert`]: between the wire's types and the core's.
 
@@ -13,6 +13,7 @@ pub mod access;
 pub mod config;
 pub mod convert;
 pub mod demo;
+pub mod export;
 pub mod fold;
 pub mod journals;
 pub mod map;

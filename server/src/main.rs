@@ -4,7 +4,7 @@ use clap::{Parser, Subcommand};
 use std::process::ExitCode;
 use toponym_server::access::{CertArgs, UserArgs};
 use toponym_server::serve::{self, LogFormat, ServeArgs};
-use toponym_server::{access, demo, journals, map};
+use toponym_server::{access, demo, export, journals, map};
 
 /// Particles make and drop many arrays of a few kilobytes, which the system's allocator scatters.
 #[global_allocator]
@@ -29,6 +29,7 @@ enum Command {
     Map(Box<map::MapArgs>),
     Show(map::ShowArgs),
     Ask(map::AskArgs),
+    Export(export::ExportArgs),
     Demo(demo::DemoArgs),
     Journal(journals::JournalArgs),
     User(UserArgs),
@@ -44,6 +45,7 @@ fn main() -> ExitCode {
         }
         Command::Map(map) => map::run(&map),
         Command::Show(show) => map::show(&show),
+        Command::Export(export) => export::run(&export),
         Command::Ask(ask) => match map::ask(&ask) {
             Ok(false) => return ExitCode::FAILURE,
             done => done.map(|_| ()),

@@ -120,7 +120,9 @@ pub fn feed(fed: &Fed) -> Outcome {
             .map_err(log_error)
             .map(|mut log| drained(&mut log)),
         Fed::Log(bytes) => with_file(bytes, |path| {
-            log::open(path, &Options::default()).map_err(log_error).map(|mut log| drained(log.as_mut()))
+            toponym_ros::log::open(path, &Options::default(), &[])
+                .map_err(log_error)
+                .map(|mut log| drained(log.as_mut()))
         }),
         Fed::Narration(bytes) => narration(bytes),
         Fed::Sentence(text) => sentence(text),
@@ -210,6 +212,7 @@ fn record(bytes: &[u8]) -> Result {
 fn log_error(e: LogError) -> Outcome {
     match e {
         LogError::Io { .. } => came(Came::NoFile, e),
+        LogError::Bag { why, .. } => came(Came::NotALog, why),
         LogError::NotALog { .. } => came(Came::NotALog, e),
         LogError::Setup { why, .. } => came(Came::RefusedSetup, why),
         LogError::NoScan { .. } => came(Came::NoScan, e),

@@ -2,7 +2,8 @@
 //! files, either of them gzipped. What a file is, its content says, not its name.
 //!
 //! [`open`] is the seam: a new format is one more implementation of [`Records`] and one more arm
-//! there. [`merged`] adds a guide's narration.
+//! there, or, with libraries that a robot does not need, a crate of its own in front of it (`toponym-ros` for
+//! bags). [`merged`] adds a guide's narration.
 
 pub mod carmen;
 mod carmen_log;
@@ -11,7 +12,7 @@ mod recorded;
 
 pub use carmen_log::CarmenLog;
 pub use narration::{Narration, NarrationError, Sentence, merged};
-pub use recorded::RecordedLog;
+pub use recorded::{RecordedLog, seconds_text};
 
 use flate2::read::MultiGzDecoder;
 use std::collections::BTreeMap;
@@ -88,7 +89,8 @@ pub struct Notes {
 impl Notes {
     const BAD_SHOWN: usize = 5;
 
-    fn bad(&mut self, line: usize, why: String) {
+    /// A line could not be read.
+    pub fn bad(&mut self, line: usize, why: String) {
         self.bad_lines += 1;
         if self.first_bad.len() < Self::BAD_SHOWN {
             self.first_bad.push((line, why));
@@ -99,7 +101,8 @@ impl Notes {
         self.remarks.push(what.into());
     }
 
-    fn count(&mut self, message: &Message) {
+    /// A message was read.
+    pub fn count(&mut self, message: &Message) {
         match message {
             Message::Setup(_) | Message::End(_) | Message::Mend(_) => {}
             Message::Odom(_) => self.odoms += 1,
@@ -182,7 +185,9 @@ pub enum LogError {
         source: std::io::Error,
     },
     /// Its content is of no known kind.
-    #[error("{file}: not a log: {why} (known: CARMEN text, record files, either gzipped)")]
+    #[error(
+        "{file}: not a log: {why} (known: CARMEN text, record files, either gzipped; rosbag2, MCAP or SQLite)"
+    )]
     NotALog {
         /// The file.
         file: PathBuf,
@@ -195,6 +200,14 @@ pub enum LogError {
         /// The file.
         file: PathBuf,
         /// The field and what is wrong with it.
+        why: String,
+    },
+    /// It is a bag, but none that can be mapped.
+    #[error("{file}: {why}")]
+    Bag {
+        /// The file or folder.
+        file: PathBuf,
+        /// What is wrong with it, and what to do.
         why: String,
     },
     /// Nothing in it can be mapped.

@@ -88,7 +88,7 @@ impl Records for RecordedLog {
 }
 
 /// Seconds, exactly: six decimals, nine where they are needed.
-pub(super) fn seconds_text(stamp: Stamp) -> String {
+pub fn seconds_text(stamp: Stamp) -> String {
     let (sign, ns) = (if stamp.ns < 0 { "-" } else { "" }, stamp.ns.unsigned_abs());
     let (s, ns) = (ns / 1_000_000_000, ns % 1_000_000_000);
     if ns.is_multiple_of(1000) { format!("{sign}{s}.{:06}", ns / 1000) } else { format!("{sign}{s}.{ns:09}") }

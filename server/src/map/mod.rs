@@ -36,7 +36,7 @@ use toponym_proto::answer::MapIdentity;
 /// Runs `map`.
 pub fn run(args: &MapArgs) -> Result<()> {
     args.check()?;
-    let log = log::open(&args.log, &log::Options::default())?;
+    let log = toponym_ros::log::open(&args.log, &log::Options::default(), &args.topics)?;
     let log = match &args.narration {
         Some(file) => log::merged(log, &Narration::read(file)?),
         None => log,
@@ -62,7 +62,7 @@ pub fn run(args: &MapArgs) -> Result<()> {
 
 /// A saved map: as a file, as a server's checkpoint, or as the folder of a map in a server's data folder, which is
 /// left as it is.
-fn load(file: &Path) -> Result<Mapper> {
+pub fn load(file: &Path) -> Result<Mapper> {
     if file.is_dir() {
         let Opened { checkpoint, tail, .. } =
             Journal::open(Folder(file.into())).with_context(|| file.display().to_string())?;

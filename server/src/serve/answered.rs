@@ -2,7 +2,7 @@
 //! time for one grows.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 use toponym_core::Snapshot;
 use toponym_core::answers::query::WhereAnswer;
@@ -11,9 +11,6 @@ use super::board::lock;
 
 /// Questions whose answers are kept; beyond, each is reckoned anew.
 const KEPT_MAX: usize = 256;
-/// So many wait for an answer while it is reckoned; more get that of the snapshot before, some tenths of a second old.
-const WAITING_MAX: usize = 8;
-
 /// What is asked, and in which language.
 type Question = (String, Option<String>);
 
@@ -38,8 +35,8 @@ struct Kept {
 #[derive(Default)]
 struct Slot {
     answer: OnceLock<WhereAnswer>,
-    /// How many have asked before it was there.
-    waiting: AtomicUsize,
+    /// Whether somebody asks for it.
+    is_asked: AtomicBool,
 }
 
 impl Answered {
@@ -53,10 +50,13 @@ impl Answered {
         let answer = || snapshot.where_is(text, lang);
         let (slot, before) = self.slots(snapshot, (text.to_owned(), lang.map(str::to_owned)));
         let Some(slot) = slot else { return (snapshot.clone(), answer()) };
+        // The first waits while it is reckoned. Others get that of the snapshot before, some tenths of a second old, but
+        // for one from before something was said: who has just said it must find it.
         if slot.answer.get().is_none()
-            && slot.waiting.fetch_add(1, Ordering::Relaxed) >= WAITING_MAX
-            && let Some((from, answer)) =
-                before.and_then(|(from, slot)| Some((from, slot.answer.get()?.clone())))
+            && slot.is_asked.swap(true, Ordering::Relaxed)
+            && let Some((from, answer)) = before
+                .filter(|(from, _)| from.says_the_same(snapshot))
+                .and_then(|(from, slot)| Some((from, slot.answer.get()?.clone())))
         {
             return (from, answer);
         }
@@ -92,7 +92,7 @@ impl Kept {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toponym_core::{Config, Mapper};
+    use toponym_core::{Config, Event, Mapper};
 
     fn snapshots() -> [Arc<Snapshot>; 2] {
         let mapper = Mapper::new(Config::default());
@@ -114,14 +114,26 @@ mod tests {
     }
 
     #[test]
-    fn few_wait_and_others_get_the_answer_before() {
+    fn one_waits_and_others_get_the_answer_before() {
         let ([first, second], answered) = (snapshots(), Answered::default());
         answered.where_is(&first, "gym", None);
         let slot = answered.slots(&second, ("gym".into(), None)).0.unwrap();
-        slot.waiting.store(WAITING_MAX, Ordering::Relaxed);
+        slot.is_asked.store(true, Ordering::Relaxed);
         assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &first));
         assert!(Arc::ptr_eq(&answered.where_is(&second, "cafe", None).0, &second), "there is none before");
         slot.answer.set(second.where_is("gym", None)).unwrap();
+        assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &second));
+    }
+
+    #[test]
+    fn who_has_said_something_gets_no_answer_from_before() {
+        let mut mapper = Mapper::new(Config::default());
+        let (answered, first) = (Answered::default(), mapper.snapshot());
+        answered.where_is(&first, "gym", None);
+        mapper.step(Event::Glossary("refectory = canteen".into()));
+        let second = mapper.snapshot();
+        let slot = answered.slots(&second, ("gym".into(), None)).0.unwrap();
+        slot.is_asked.store(true, Ordering::Relaxed);
         assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &second));
     }
 }

@@ -17,12 +17,15 @@ Examples:
   toponym replay tour.clf.gz --narration narration.jsonl --speed max --map floor2
 
 LOG is CARMEN text (FLASER, ROBOTLASER1, ODOM, PARAM lines) or a file of `serve --record`, either
-of them gzipped. A narration has a sentence a line: {\"t\": 8, \"text\": \"this is the gym\"}, with t
+of them gzipped; or a ROS 2 bag: its folder, an .mcap or a .db3. A narration has a sentence a line: {\"t\": 8, \"text\": \"this is the gym\"}, with t
 in the log's own stamps, or t_rel in seconds since its first. Returns when the server has taken in
 all of it.")]
 pub struct ReplayArgs {
     /// The log.
     log: PathBuf,
+    /// Of a bag take these topics alone, and transforms; without, what is there tells which are the robot's.
+    #[arg(long, value_name = "TOPIC,…", value_delimiter = ',')]
+    topics: Vec<String>,
     /// What the guide says, a JSON object a line.
     #[arg(long, value_name = "FILE")]
     narration: Option<PathBuf>,
@@ -62,7 +65,7 @@ fn speed(text: &str) -> Result<Speed, String> {
 pub async fn replay(to: &Connection, site: &str, args: &ReplayArgs) -> Result<u8, Failure> {
     let narration = args.narration.as_deref().map(Narration::read).transpose()?.unwrap_or_default();
     let options = Options { robot: args.robot.clone(), map: args.map.clone(), boot: 0 };
-    let mut log = log::merged(log::open(&args.log, &options)?, &narration);
+    let mut log = log::merged(toponym_ros::log::open(&args.log, &options, &args.topics)?, &narration);
     let session = to.open().await?;
     let mut robot = RobotConfig::new(&args.robot);
     robot.site = site.into();

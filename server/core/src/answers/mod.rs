@@ -1,6 +1,7 @@
 //! Answers: the posterior at one moment, and what it is asked.
 
 pub mod around;
+pub mod constraints;
 pub mod described;
 pub mod differences;
 mod meaning;

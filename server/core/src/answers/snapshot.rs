@@ -132,6 +132,21 @@ impl Snapshot {
         self.unresolved
     }
 
+    /// Places that are left behind, oldest first.
+    pub(crate) fn frozen(&self) -> &[Arc<Place>] {
+        &self.places
+    }
+
+    /// The likeliest particle.
+    pub(crate) fn best(&self) -> &Particle {
+        &self.particles[0]
+    }
+
+    /// Whether nothing was said, taken back or mended between this one and another.
+    pub fn says_the_same(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.ledger, &other.ledger)
+    }
+
     /// What was said.
     pub(crate) fn ledger(&self) -> &Ledger {
         &self.ledger

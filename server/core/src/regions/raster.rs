@@ -94,6 +94,14 @@ impl Raster {
         (along(self.corner_m.0, x), along(self.corner_m.1, y))
     }
 
+    /// The cell in which a point of the map lies.
+    pub fn cell(&self, x_m: f64, y_m: f64) -> Option<usize> {
+        let along = |m: f64, corner_m: f64| ((m - corner_m) / self.resolution_m).floor();
+        let (x, y) = (along(x_m, self.corner_m.0), along(y_m, self.corner_m.1));
+        let is_inside = (0.0..self.width as f64).contains(&x) && (0.0..self.height as f64).contains(&y);
+        is_inside.then(|| y as usize * self.width + x as usize)
+    }
+
     /// The cells whose middles are so near to a point.
     pub fn around(&self, x_m: f64, y_m: f64, reach_m: f64) -> impl Iterator<Item = usize> + use<'_> {
         let to_cell = |m: f64, corner_m: f64| ((m - corner_m) / self.resolution_m).floor() as i64;

@@ -71,6 +71,12 @@ pub(super) fn drivable(
 }
 
 impl Rooms {
+    /// How far a point is from what stands there or is not known, metres; 0 where nothing is free.
+    pub fn clearance_m(&self, x_m: f64, y_m: f64) -> f64 {
+        let Some(floor) = &self.floor else { return 0.0 };
+        floor.raster.cell(x_m, y_m).map_or(0.0, |cell| floor.clearance[cell].into())
+    }
+
     /// Where to stand in a region, as near as can be to a point, for who comes from another; none if there is no room.
     pub fn goal(&self, region: usize, near: (f64, f64), from: Option<(f64, f64)>) -> Option<Goal> {
         let floor = self.floor.as_ref()?;

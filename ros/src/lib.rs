@@ -1,0 +1,22 @@
+//! # toponym-ros
+//!
+//! Robots that speak ROS 2, and their bags. No ROS is needed.
+//!
+//! ```text
+//! file ─ bag ─▶ topic, type, time, bytes ─ cdr, msg ─▶ LaserScan, TFMessage, … ─ plan ─▶ which of them are the robot
+//!                                                                              ─ stream ─▶ Setup, Odom, Scan, Say
+//! ```
+//!
+//! - [`msg`]: the messages used, in Rust; [`cdr`]: as bytes.
+//! - [`bag`]: rosbag2 files and folders, MCAP or SQLite, compressed or not.
+//! - [`frames`]: how a laser is mounted, and which transform is odometry.
+//! - [`plan`]: what a stream of messages has to offer, and what of it is taken; [`stream`]: that as toponym's messages.
+//! - [`log`]: a bag as a log, beside all other logs.
+
+pub mod bag;
+pub mod cdr;
+pub mod frames;
+pub mod log;
+pub mod msg;
+pub mod plan;
+pub mod stream;
