@@ -1,11 +1,11 @@
 //! A CARMEN log as messages: setup first, then odometry and scans in the order of their lines.
 
 use super::carmen::{self, Line, ScanLine};
-use super::{LogError, LogRecord, Notes, Options, Records};
+use super::{LogError, LogRecord, Notes, Options, Records, check};
 use std::collections::VecDeque;
 use std::f64::consts::{PI, TAU};
 use toponym_proto::stream::Laser;
-use toponym_proto::{Clock, Header, Limits, Message, Odom, Pose, Scan, Setup, Stamp};
+use toponym_proto::{Clock, Header, Message, Odom, Pose, Scan, Setup, Stamp};
 
 /// The only laser of these logs.
 const LASER: &str = "front";
@@ -142,11 +142,6 @@ fn sweep(scan: ScanLine<'_>, header: Header, range_max_m: f64, view_rad: f64) ->
     });
     check(&message)?;
     Ok(message)
-}
-
-/// What a server would refuse is not read either: a log makes the same map offline and online.
-fn check(message: &Message) -> Result<(), String> {
-    message.validate(&Limits::default()).map_err(|invalid| invalid.to_string())
 }
 
 impl Iterator for CarmenLog {

@@ -1,4 +1,5 @@
 use super::*;
+use toponym_proto::Limits;
 
 fn log(text: &str) -> CarmenLog {
     CarmenLog::new(text.as_bytes().to_vec(), &Options::default(), Notes::default()).unwrap()

@@ -1,5 +1,5 @@
-//! Recorded logs as streams of messages: CARMEN text (`.clf`, `.log`) and the server's `--record`
-//! files, either of them gzipped. What a file is, its content says, not its name.
+//! Recorded logs as streams of messages: CARMEN text (`.clf`, `.log`), tables of numbers, and the server's
+//! `--record` files, all of them gzipped or not. What a file is, its content says, not its name.
 //!
 //! [`open`] is the seam: a new format is one more implementation of [`Records`] and one more arm
 //! there, or, with libraries that a robot does not need, a crate of its own in front of it (`toponym-ros` for
@@ -7,10 +7,12 @@
 
 pub mod carmen;
 mod carmen_log;
+mod csv;
 mod narration;
 mod recorded;
 
 pub use carmen_log::CarmenLog;
+pub use csv::CsvLog;
 pub use narration::{Narration, NarrationError, Sentence, merged};
 pub use recorded::{RecordedLog, seconds_text};
 
@@ -20,7 +22,7 @@ use std::fmt::Write as _;
 use std::io::Read;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
-use toponym_proto::{Message, record};
+use toponym_proto::{Limits, Message, record};
 
 /// A message of a log.
 #[derive(Clone, Debug, PartialEq)]
@@ -186,7 +188,7 @@ pub enum LogError {
     },
     /// Its content is of no known kind.
     #[error(
-        "{file}: not a log: {why} (known: CARMEN text, record files, either gzipped; rosbag2, MCAP or SQLite)"
+        "{file}: not a log: {why} (known: CARMEN text, tables of t, x, y, yaw and ranges, record files, all of them gzipped or not; rosbag2, MCAP or SQLite)"
     )]
     NotALog {
         /// The file.
@@ -236,7 +238,27 @@ pub fn open(path: &Path, options: &Options) -> Result<Box<dyn Records>, LogError
     if bytes.contains(&0) {
         return Err(LogError::NotALog { file: path.into(), why: not_text(path, &notes) });
     }
+    if csv::is_table(&bytes) {
+        return Ok(Box::new(CsvLog::new(bytes, options, notes)?));
+    }
     Ok(Box::new(CarmenLog::new(bytes, options, notes)?))
+}
+
+/// Opens a trajectory (`t, x, y, yaw`, or TUM's lines) with a table of scans (`t` and ranges) beside it.
+///
+/// # Errors
+/// If a file can't be read, there is no pose or no usable scan.
+pub fn with_scans(trajectory: &Path, scans: &Path, options: &Options) -> Result<Box<dyn Records>, LogError> {
+    let mut notes = Notes { file: trajectory.into(), ..Notes::default() };
+    let poses = read(trajectory, &mut notes)?;
+    notes.file = scans.into();
+    let scans = read(scans, &mut notes)?;
+    Ok(Box::new(CsvLog::with_scans(&poses, scans, options, notes)?))
+}
+
+/// What a server would refuse is not read either: a log makes the same map offline and online.
+fn check(message: &Message) -> Result<(), String> {
+    message.validate(&Limits::default()).map_err(|invalid| invalid.to_string())
 }
 
 fn not_text(path: &Path, notes: &Notes) -> String {

@@ -3,12 +3,12 @@
 use std::fmt::Write as _;
 use toponym_core::Snapshot;
 
-/// Vertices by their places' ids, the first fixed; the chain, then loop edges.
+/// Vertices by their places' ids, of places that are left behind, the first fixed; the chain, then loop edges.
 pub fn text(snapshot: &Snapshot) -> String {
     let places = snapshot.places();
     let mut text = String::new();
     // Writing to a string cannot fail.
-    for place in &places {
+    for place in &places[..snapshot.left_behind()] {
         let p = place.pose;
         let _ = writeln!(text, "VERTEX_SE2 {} {:.9} {:.9} {:.9}", place.id, p.x_m, p.y_m, p.yaw_rad);
     }

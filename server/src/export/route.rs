@@ -96,7 +96,8 @@ fn nearest(
 /// From place to place as they follow each other.
 fn driven(snapshot: &Snapshot, places: &[PlaceView], rooms: &Rooms) -> Vec<Way> {
     let chain = snapshot.constraints().into_iter().filter(|c| !c.is_loop);
-    let all = chain.map(|c| [c.i as usize, c.j as usize]);
+    let newest = (snapshot.left_behind().max(1)..places.len()).map(|j| [j - 1, j]);
+    let all = chain.map(|c| [c.i as usize, c.j as usize]).chain(newest);
     let near = all.filter(|[i, j]| places[*i].pose.distance_m(&places[*j].pose) <= JOIN_MAX_M);
     near.map(|of| way(of, of.map(|k| &places[k].pose), rooms, true)).collect()
 }

@@ -27,8 +27,12 @@ pub enum Preset {
 #[command(after_help = "Example:\n  toponym-server map tour.clf.gz --narration tour.jsonl \\\n    \
     --ask \"where is the kitchen\" --trajectory tour.txt --image tour.png")]
 pub struct MapArgs {
-    /// CARMEN log or a file that `serve --record` wrote, gzipped or not; or a ROS 2 bag: its folder, an .mcap or a .db3
+    /// CARMEN log, table of t, x, y, yaw and ranges, or a file that `serve --record` wrote, gzipped or not; or a ROS 2
+    /// bag: its folder, an .mcap or a .db3
     pub log: PathBuf,
+    /// Scans, one line of t and ranges each: LOG is a trajectory, lines of t, x, y, yaw or of TUM's
+    #[arg(long, value_name = "FILE")]
+    pub scans: Option<PathBuf>,
     /// Of a bag take these topics alone, and transforms: lasers, odometry where no transform tells it, and texts that
     /// people said; without, what is there tells which they are
     #[arg(long, value_name = "TOPIC,…", value_delimiter = ',')]

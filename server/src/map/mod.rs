@@ -36,7 +36,10 @@ use toponym_proto::answer::MapIdentity;
 /// Runs `map`.
 pub fn run(args: &MapArgs) -> Result<()> {
     args.check()?;
-    let log = toponym_ros::log::open(&args.log, &log::Options::default(), &args.topics)?;
+    let log = match &args.scans {
+        Some(scans) => log::with_scans(&args.log, scans, &log::Options::default())?,
+        None => toponym_ros::log::open(&args.log, &log::Options::default(), &args.topics)?,
+    };
     let log = match &args.narration {
         Some(file) => log::merged(log, &Narration::read(file)?),
         None => log,

@@ -132,6 +132,11 @@ impl Snapshot {
         self.unresolved
     }
 
+    /// How many places are left behind, the first of all: newer ones are not tied to the graph yet.
+    pub fn left_behind(&self) -> usize {
+        self.places.len()
+    }
+
     /// Places that are left behind, oldest first.
     pub(crate) fn frozen(&self) -> &[Arc<Place>] {
         &self.places
