@@ -2,7 +2,7 @@
 //! time for one grows.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 use toponym_core::Snapshot;
 use toponym_core::answers::query::WhereAnswer;
@@ -11,6 +11,10 @@ use super::board::lock;
 
 /// Questions whose answers are kept; beyond, each is reckoned anew.
 const KEPT_MAX: usize = 256;
+/// While an answer is reckoned one waits for it, and others get that of the snapshot before, some tenths of a second old;
+/// so many wait where something was said in between: who has just said it wants to find it.
+const WAITING_MAX: usize = 8;
+
 /// What is asked, and in which language.
 type Question = (String, Option<String>);
 
@@ -35,8 +39,8 @@ struct Kept {
 #[derive(Default)]
 struct Slot {
     answer: OnceLock<WhereAnswer>,
-    /// Whether somebody asks for it.
-    is_asked: AtomicBool,
+    /// How many have asked before it was there.
+    waiting: AtomicUsize,
 }
 
 impl Answered {
@@ -50,12 +54,10 @@ impl Answered {
         let answer = || snapshot.where_is(text, lang);
         let (slot, before) = self.slots(snapshot, (text.to_owned(), lang.map(str::to_owned)));
         let Some(slot) = slot else { return (snapshot.clone(), answer()) };
-        // The first waits while it is reckoned. Others get that of the snapshot before, some tenths of a second old, but
-        // for one from before something was said: who has just said it must find it.
         if slot.answer.get().is_none()
-            && slot.is_asked.swap(true, Ordering::Relaxed)
+            && let nth = slot.waiting.fetch_add(1, Ordering::Relaxed)
             && let Some((from, answer)) = before
-                .filter(|(from, _)| from.says_the_same(snapshot))
+                .filter(|(from, _)| nth >= if from.says_the_same(snapshot) { 1 } else { WAITING_MAX })
                 .and_then(|(from, slot)| Some((from, slot.answer.get()?.clone())))
         {
             return (from, answer);
@@ -118,7 +120,7 @@ mod tests {
         let ([first, second], answered) = (snapshots(), Answered::default());
         answered.where_is(&first, "gym", None);
         let slot = answered.slots(&second, ("gym".into(), None)).0.unwrap();
-        slot.is_asked.store(true, Ordering::Relaxed);
+        slot.waiting.store(1, Ordering::Relaxed);
         assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &first));
         assert!(Arc::ptr_eq(&answered.where_is(&second, "cafe", None).0, &second), "there is none before");
         slot.answer.set(second.where_is("gym", None)).unwrap();
@@ -126,14 +128,16 @@ mod tests {
     }
 
     #[test]
-    fn who_has_said_something_gets_no_answer_from_before() {
+    fn who_has_said_something_waits_unless_many_do() {
         let mut mapper = Mapper::new(Config::default());
         let (answered, first) = (Answered::default(), mapper.snapshot());
         answered.where_is(&first, "gym", None);
         mapper.step(Event::Glossary("refectory = canteen".into()));
         let second = mapper.snapshot();
         let slot = answered.slots(&second, ("gym".into(), None)).0.unwrap();
-        slot.is_asked.store(true, Ordering::Relaxed);
+        slot.waiting.store(WAITING_MAX, Ordering::Relaxed);
+        assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &first));
+        slot.waiting.store(WAITING_MAX - 1, Ordering::Relaxed);
         assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &second));
     }
 }
