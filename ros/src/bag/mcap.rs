@@ -15,6 +15,8 @@ pub struct McapPart {
     schemas: BTreeMap<u16, String>,
     /// Topics of channels.
     channels: BTreeMap<u16, usize>,
+    /// Bytes taken from the file.
+    read: u64,
     ended: bool,
 }
 
@@ -27,6 +29,7 @@ impl McapPart {
             reader: LinearReader::new_with_options(options),
             schemas: BTreeMap::new(),
             channels: BTreeMap::new(),
+            read: 0,
             ended: false,
         }
     }
@@ -36,12 +39,17 @@ impl McapPart {
         if self.ended {
             return None;
         }
-        let next = self.read(topics).transpose();
+        let next = self.record(topics).transpose();
         self.ended = !matches!(next, Some(Ok(_)));
         next
     }
 
-    fn read(&mut self, topics: &mut Topics) -> Result<Option<Raw>, String> {
+    /// Bytes read; of a file that is compressed as a whole, those that came out.
+    pub fn read(&self) -> u64 {
+        self.read
+    }
+
+    fn record(&mut self, topics: &mut Topics) -> Result<Option<Raw>, String> {
         loop {
             let event = match self.reader.next_event() {
                 None => return Ok(None),
@@ -52,6 +60,7 @@ impl McapPart {
                     let count = count.min(MESSAGE_MAX);
                     let read = self.file.read(self.reader.insert(count)).map_err(|e| e.to_string())?;
                     self.reader.notify_read(read);
+                    self.read += read as u64;
                 }
                 LinearReadEvent::Record { data, opcode } => {
                     match parse_record(opcode, data).map_err(|e| e.to_string())? {

@@ -71,8 +71,9 @@ pub struct Bag {
     /// Why a part ended before its end.
     broken: Vec<String>,
     bytes: u64,
-    /// Bytes of the parts that are read.
+    /// Bytes of the parts that are read, and of that being read.
     done: u64,
+    length: u64,
 }
 
 enum Part {
@@ -128,17 +129,25 @@ impl Bag {
         let parts: VecDeque<PathBuf> = if path.is_dir() { parts(path).into() } else { [path.into()].into() };
         let length = |path: &PathBuf| std::fs::metadata(path).map_or(0, |m| m.len());
         let bytes = parts.iter().map(length).sum();
-        let mut bag =
-            Self { parts, part: None, topics: Topics::default(), broken: Vec::new(), bytes, done: 0 };
+        let mut bag = Self {
+            parts,
+            part: None,
+            topics: Topics::default(),
+            broken: Vec::new(),
+            bytes,
+            done: 0,
+            length: 0,
+        };
         bag.next_part()?;
         Ok(bag)
     }
 
     fn next_part(&mut self) -> Result<(), String> {
         self.part = None;
+        self.done += std::mem::take(&mut self.length);
         let Some(path) = self.parts.pop_front() else { return Ok(()) };
         let file = File::open(&path).map_err(|e| e.to_string())?;
-        let length = file.metadata().map_or(0, |m| m.len());
+        self.length = file.metadata().map_or(0, |m| m.len());
         let mut content = plain(file).map_err(|e| e.to_string())?;
         let mut first = Vec::new();
         content.by_ref().take(SQLITE.len() as u64).read_to_end(&mut first).map_err(|e| e.to_string())?;
@@ -147,7 +156,6 @@ impl Bag {
         } else {
             Part::Mcap(Box::new(McapPart::new(Box::new(std::io::Cursor::new(first).chain(content)))))
         });
-        self.done += length;
         Ok(())
     }
 
@@ -161,9 +169,14 @@ impl Bag {
         &self.broken
     }
 
-    /// Bytes of the files that are read or being read, and of all.
+    /// Bytes of its files that are read, about, and of all.
     pub fn progress(&self) -> (u64, u64) {
-        (self.done, self.bytes)
+        let within = match &self.part {
+            Some(Part::Mcap(part)) => part.read(),
+            Some(Part::Sqlite(part)) => (part.share() * self.length as f64) as u64,
+            None => 0,
+        };
+        (self.done + within.min(self.length), self.bytes)
     }
 
     fn raw(&mut self) -> Option<Result<Raw, String>> {

@@ -20,6 +20,8 @@ pub struct SqlitePart {
     /// Time and id of the newest message read.
     last: (i64, i64),
     ended: bool,
+    /// Messages read, and in all.
+    count: (u64, u64),
     /// Where a copy of the file is, if one had to be made.
     _scratch: Option<Scratch>,
 }
@@ -33,12 +35,15 @@ impl SqlitePart {
         let flags = if scratch.is_some() { OpenFlags::SQLITE_OPEN_READ_WRITE } else { flags };
         let connection = Connection::open_with_flags(&file, flags).map_err(|e| e.to_string())?;
         let ids = read_topics(&connection, topics).map_err(|why| format!("no table of topics: {why}"))?;
+        let all = connection.query_row("SELECT count(*) FROM messages", [], |row| row.get::<_, i64>(0));
+        let all = all.map_err(|e| format!("no table of messages: {e}"))? as u64;
         Ok(Self {
             connection,
             topics: ids,
             page: VecDeque::new(),
             last: (i64::MIN, i64::MIN),
             ended: false,
+            count: (0, all),
             _scratch: scratch,
         })
     }
@@ -55,6 +60,11 @@ impl SqlitePart {
             }
         }
         self.page.pop_front().map(Ok)
+    }
+
+    /// Share of its messages that is read.
+    pub fn share(&self) -> f64 {
+        self.count.0 as f64 / self.count.1.max(1) as f64
     }
 
     /// Reads the next page; tells how many rows it had.
@@ -77,6 +87,7 @@ impl SqlitePart {
                 self.page.push_back(Raw { topic, received_ns: self.last.0, data: data.to_vec() });
             }
         }
+        self.count.0 += count as u64;
         Ok(count)
     }
 }

@@ -22,7 +22,7 @@ use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::places::OpenPlace;
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+use std::sync::{Arc, Mutex, OnceLock};
 
 /// Names told of a place.
 const NAMES_MAX: usize = 5;
@@ -179,8 +179,13 @@ impl Snapshot {
     /// Regions of the best graph: made when first asked for, for all snapshots of one posterior together.
     pub fn rooms(&self) -> &Arc<Rooms> {
         self.shared.rooms.get_or_init(|| {
-            // Whatever state a panic left it in: it follows from any.
-            let mut plot = self.shared.plot.lock().unwrap_or_else(PoisonError::into_inner);
+            // One that a panic left half counted is begun anew.
+            let mut plot = self.shared.plot.lock().unwrap_or_else(|half| {
+                self.shared.plot.clear_poison();
+                let mut plot = half.into_inner();
+                *plot = None;
+                plot
+            });
             Arc::new(Rooms::new(plot.get_or_insert_with(Rooms::plot), &self.posed()))
         })
     }
