@@ -28,6 +28,7 @@ pub mod robot;
 pub mod said;
 pub mod session;
 pub mod spool;
+pub mod told;
 
 #[cfg(test)]
 mod network_tests;

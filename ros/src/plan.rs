@@ -14,7 +14,7 @@ const RANGE_MIN_M: f64 = 0.02;
 /// Parts of names of topics on which texts are what people say.
 const SPEECH: [&str; 7] = ["speech", "say", "said", "utterance", "narration", "voice", "transcript"];
 
-/// Types of messages that are read.
+/// Types of messages that are read or written.
 pub mod kind {
     #![allow(missing_docs, reason = "names")]
     pub const SCAN: &str = "sensor_msgs/msg/LaserScan";
@@ -22,6 +22,15 @@ pub mod kind {
     pub const TF: &str = "tf2_msgs/msg/TFMessage";
     pub const TEXT: &str = "std_msgs/msg/String";
     pub const CLOCK: &str = "rosgraph_msgs/msg/Clock";
+    pub const GRID: &str = "nav_msgs/msg/OccupancyGrid";
+    pub const GRID_METADATA: &str = "nav_msgs/msg/MapMetaData";
+    pub const POSE: &str = "geometry_msgs/msg/PoseStamped";
+    pub const POSE_WITH_COVARIANCE: &str = "geometry_msgs/msg/PoseWithCovarianceStamped";
+    pub const PATH: &str = "nav_msgs/msg/Path";
+    pub const POINTS: &str = "sensor_msgs/msg/PointCloud2";
+    pub const MARKERS: &str = "visualization_msgs/msg/MarkerArray";
+    pub const TRIGGER: &str = "std_srvs/srv/Trigger";
+    pub const WHERE: &str = "toponym_msgs/srv/Where";
 }
 
 /// What was seen of a stream so far.
@@ -45,6 +54,7 @@ struct Seen {
     frame: String,
     range_min_m: f64,
     range_max_m: f64,
+    first_ns: i64,
     last_ns: Option<i64>,
     /// Stamps do not move.
     stands: bool,
@@ -57,12 +67,34 @@ pub struct Plan {
     pub odometry: Source,
     /// Its lasers, by topic.
     pub lasers: BTreeMap<String, Laser>,
-    /// Topics on which people speak.
+    /// Topics on which people have spoken.
     pub speech: BTreeSet<String>,
+    /// Topics that are looked at; none: all.
+    pub wanted: Vec<String>,
     /// Stamps mean nothing: the time of reception is taken.
     pub by_reception: bool,
     /// What was supposed, for people.
     pub remarks: Vec<String>,
+}
+
+impl Plan {
+    /// Whether it takes the same in the same way.
+    pub fn is_as(&self, other: &Self) -> bool {
+        (&self.odometry, &self.lasers) == (&other.odometry, &other.lasers)
+    }
+
+    /// Whether texts on a topic are what people say, be it that nobody has said anything yet.
+    pub fn is_speech(&self, topic: &str) -> bool {
+        is_speech(topic, &self.wanted)
+    }
+
+    /// The transform that is its odometry.
+    pub fn moving(&self) -> Option<&Moving> {
+        match &self.odometry {
+            Source::Tf { moving, .. } | Source::Topic { moving, .. } => Some(moving),
+            Source::None => None,
+        }
+    }
 }
 
 /// Where odometry is from.
@@ -76,7 +108,12 @@ pub enum Source {
         moving: Moving,
     },
     /// A topic of odometry.
-    Topic(String),
+    Topic {
+        /// `/odom`
+        topic: String,
+        /// Its frames.
+        moving: Moving,
+    },
     /// There is none: scans alone tell the way.
     None,
 }
@@ -118,11 +155,8 @@ impl Survey {
                 };
                 self.odometry.insert(topic.name.clone(), moving);
             }
-            kind::TEXT if is_wanted => {
-                let last = topic.name.rsplit('/').next().unwrap_or_default().to_lowercase();
-                if !self.wanted.is_empty() || SPEECH.iter().any(|word| last.contains(word)) {
-                    self.texts.insert(topic.name.clone());
-                }
+            kind::TEXT if is_speech(&topic.name, &self.wanted) => {
+                self.texts.insert(topic.name.clone());
             }
             _ => {}
         }
@@ -132,6 +166,9 @@ impl Survey {
     fn see(&mut self, topic: &str, scan: &LaserScan) {
         let seen = self.scans.entry(topic.to_owned()).or_default();
         let stamp_ns = scan.header.stamp.ns();
+        if seen.last_ns.is_none() {
+            seen.first_ns = stamp_ns;
+        }
         seen.stands = seen.last_ns == Some(stamp_ns);
         seen.last_ns = Some(stamp_ns);
         seen.frame.clone_from(&scan.header.frame_id);
@@ -149,6 +186,18 @@ impl Survey {
         let (space, frames) = self.around(topic)?;
         let (moving, pose) = frames.odometry_of(frame)?;
         Some((space, moving, pose))
+    }
+
+    /// Where transforms of a namespace are: its own topic, or that of all.
+    pub fn tf_topic(&self, namespace: &str) -> String {
+        let around = self.around(&format!("{namespace}/tf")).map_or("", |(space, _)| space);
+        format!("{around}/tf")
+    }
+
+    /// Over how long scans were seen, by their stamps.
+    pub fn scanned_ns(&self) -> i64 {
+        let of = |seen: &Seen| seen.last_ns.map_or(0, |last_ns| last_ns.saturating_sub(seen.first_ns));
+        self.scans.values().map(of).max().unwrap_or(0)
     }
 
     /// Whether all lasers seen are known to be carried by something that moves.
@@ -195,18 +244,25 @@ impl Survey {
         if by_reception {
             remarks.push("the stamps of its scans do not move: the time of their reception is taken".into());
         }
-        Ok(Plan { odometry, lasers, speech: self.texts.clone(), by_reception, remarks })
+        Ok(Plan {
+            odometry,
+            lasers,
+            speech: self.texts.clone(),
+            wanted: self.wanted.clone(),
+            by_reception,
+            remarks,
+        })
     }
 
     /// Where no transform tells where the robot is.
     fn odometry_topic(&self, remarks: &mut Vec<String>) -> Source {
-        let fused = self.odometry.keys().find(|topic| topic.contains("filtered"));
-        let Some(topic) = fused.or_else(|| self.odometry.keys().next()) else {
+        let fused = self.odometry.iter().find(|(topic, _)| topic.contains("filtered"));
+        let Some((topic, moving)) = fused.or_else(|| self.odometry.iter().next()) else {
             remarks.push("neither a transform nor odometry tells how the robot moves: scans alone do".into());
             return Source::None;
         };
         remarks.push(format!("no transform tells how the robot moves: odometry is taken from {topic}"));
-        Source::Topic(topic.clone())
+        Source::Topic { topic: topic.clone(), moving: moving.clone() }
     }
 
     fn laser(
@@ -218,10 +274,9 @@ impl Survey {
     ) -> Result<Laser, String> {
         let pose = match odometry {
             Source::Tf { .. } => self.carrier(topic, &seen.frame).map(|(_, _, pose)| pose),
-            Source::Topic(of) => self.odometry.get(of).and_then(|moving| {
-                let (_, frames) = self.around(topic)?;
-                frames.fixed_in(&seen.frame, &moving.child)
-            }),
+            Source::Topic { moving, .. } => {
+                self.around(topic).and_then(|(_, frames)| frames.fixed_in(&seen.frame, &moving.child))
+            }
             Source::None => None,
         };
         if pose.is_none() {
@@ -265,6 +320,15 @@ impl Survey {
             if self.wanted.is_empty() { String::new() } else { format!(" on {}", self.wanted.join(", ")) };
         let has = if topics.is_empty() { "nothing".to_owned() } else { topics.join(", ") };
         format!("no {} in CDR{looked}, which is what maps are made of; it has {has}", kind::SCAN)
+    }
+}
+
+fn is_speech(topic: &str, wanted: &[String]) -> bool {
+    let last = topic.rsplit('/').next().unwrap_or_default().to_lowercase();
+    if wanted.is_empty() {
+        SPEECH.iter().any(|word| last.contains(word))
+    } else {
+        wanted.iter().any(|w| w == topic)
     }
 }
 

@@ -9,8 +9,11 @@ use std::collections::{BTreeMap, VecDeque};
 use toponym::log::Options;
 use toponym_proto::{Clock, Header, Limits, Message, Odom, Pose, Say, Scan, Setup, Stamp};
 
-/// So long others are waited for: a scan is sent when it is whole, a tenth of a second after odometry of its stamp.
-const WINDOW_NS: i64 = 300_000_000;
+/// So long a message is kept for streams that are behind: a scan is sent when it is whole, a tenth of a second after
+/// odometry of its stamp, and odometry may come late over the air.
+const WINDOW_NS: i64 = 2_000_000_000;
+/// A stamp so much earlier than the newest of its stream is of a clock that began anew.
+const BACK_NS: i64 = 1_000_000_000;
 /// Stamps and times of reception that differ by less are of one clock.
 const ONE_CLOCK_NS: i64 = 5_000_000_000;
 
@@ -25,6 +28,8 @@ pub struct Stream {
     ready: VecDeque<Message>,
     arrived: u64,
     newest_ns: i64,
+    /// How many in a row were far back.
+    back: u32,
     /// Newest stamp of each topic, and of odometry (empty name), that was taken.
     taken_ns: BTreeMap<String, i64>,
     /// By how much reception is later than stamps.
@@ -55,6 +60,7 @@ impl Stream {
             ready: VecDeque::new(),
             arrived: 0,
             newest_ns: i64::MIN,
+            back: 0,
             taken_ns: BTreeMap::new(),
             lag_ns: None,
             clock_ns: None,
@@ -77,13 +83,13 @@ impl Stream {
             (kind::TF, Source::Tf { topic: of, .. }) if *of == topic.name => {
                 self.transforms(received_ns, &cdr::read(data)?)?;
             }
-            (kind::ODOMETRY, Source::Topic(of)) if *of == topic.name => {
+            (kind::ODOMETRY, Source::Topic { topic: of, .. }) if *of == topic.name => {
                 let message: Odometry = cdr::read(data)?;
                 let pose = message.pose.pose;
                 let transform = Transform { translation: pose.position, rotation: pose.orientation };
                 self.odom(message.header.stamp, received_ns, &transform)?;
             }
-            (kind::TEXT, _) if self.plan.speech.contains(&topic.name) => {
+            (kind::TEXT, _) if self.plan.is_speech(&topic.name) => {
                 self.say(received_ns, cdr::read::<StringMsg>(data)?.data)?;
             }
             // The plan has them.
@@ -97,6 +103,13 @@ impl Stream {
     /// The next message, if it is not to be waited for any more.
     pub fn pop(&mut self) -> Option<Message> {
         self.ready.pop_front()
+    }
+
+    /// Sentences that wait for what was seen before them; whoever puts them in order himself need not wait for more.
+    pub fn said(&mut self) -> Vec<Message> {
+        let is_said = |(_, message): &(&(i64, u64), &Message)| matches!(message, Message::Say(_));
+        let of: Vec<(i64, u64)> = self.waiting.iter().filter(is_said).map(|(&at, _)| at).collect();
+        of.iter().filter_map(|at| self.waiting.remove(at)).collect()
     }
 
     /// Nothing is waited for any more.
@@ -113,6 +126,7 @@ impl Stream {
         match self.taken_ns.get(stream) {
             Some(last) if stamp_ns == *last => return Err("the same stamp again".into()),
             Some(last) if stamp_ns < *last => {
+                self.back += u32::from(last - stamp_ns > BACK_NS);
                 let back_s = (last - stamp_ns) as f64 * 1e-9;
                 return Err(format!("its stamp is {back_s:.3} s before that of the one before"));
             }
@@ -187,9 +201,28 @@ impl Stream {
         message.validate(&Limits::default()).map_err(|e| e.to_string())?;
         self.taken_ns.insert(stream.to_owned(), stamp_ns);
         self.newest_ns = self.newest_ns.max(stamp_ns);
+        self.back = 0;
         self.wait(stamp_ns, message);
-        self.release(self.newest_ns.saturating_sub(WINDOW_NS));
+        self.release(self.settled_ns());
         Ok(())
+    }
+
+    /// Nothing earlier is waited for: all streams have come so far, or are too far behind.
+    fn settled_ns(&self) -> i64 {
+        let odometry = (self.plan.odometry != Source::None).then_some("");
+        let streams = self.plan.lasers.keys().map(String::as_str).chain(odometry);
+        let slowest_ns = streams.map(|of| self.taken_ns.get(of).copied().unwrap_or(i64::MIN)).min();
+        slowest_ns.unwrap_or(i64::MIN).max(self.newest_ns.saturating_sub(WINDOW_NS))
+    }
+
+    /// The newest stamp.
+    pub fn newest_ns(&self) -> i64 {
+        self.newest_ns
+    }
+
+    /// How many messages in a row came from long before the newest: the clock began anew.
+    pub fn back(&self) -> u32 {
+        self.back
     }
 
     fn wait(&mut self, stamp_ns: i64, message: Message) {

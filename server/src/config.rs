@@ -7,6 +7,7 @@ use toponym_core::language::Glossary;
 use toponym_core::language::glossary::GlossaryError;
 use toponym_proto::keys::{DEFAULT_ENDPOINT, DEFAULT_SITE, check_id, check_link};
 use toponym_proto::{Invalid, Limits};
+use toponym_ros::live::RosRobot;
 
 /// Settings of `toponym-server serve`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -38,6 +39,9 @@ pub struct ServerConfig {
     pub limits: Limits,
     /// Who may do what.
     pub access: AccessConfig,
+    /// Robots that speak ROS 2.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub ros: Vec<RosRobot>,
     /// The filter of new maps.
     pub mapper: toponym_core::Config,
 }
@@ -81,6 +85,7 @@ impl Default for ServerConfig {
             log_speech: false,
             limits: Limits::default(),
             access: AccessConfig::default(),
+            ros: Vec::new(),
             mapper: toponym_core::Config::default(),
         }
     }
@@ -187,6 +192,13 @@ impl ServerConfig {
             }
         }
         self.limits.check()?;
+        for (k, robot) in self.ros.iter().enumerate() {
+            robot.check()?;
+            if self.ros[..k].iter().any(|other| other.robot == robot.robot) {
+                let message = format!("has two robots called {:?}: give each its name", robot.robot);
+                return Err(Invalid::new("ros", message).into());
+            }
+        }
         for (field, value, range) in [
             ("mapper.place_spacing_m", self.mapper.place_spacing_m, 0.1..=100.0),
             ("mapper.gamma_per_m2", self.mapper.gamma_per_m2, 0.0..=1e3),
@@ -244,6 +256,8 @@ mod tests {
             ("hold_back_s = nan", "hold_back_s"),
             ("gap_wait_s = -1.0", "gap_wait_s"),
             ("[limits]\nqueue_messages = 0", "queue_messages"),
+            ("[[ros]]\nnamespace = \"r1\"", "ros.namespace"),
+            ("[[ros]]\n[[ros]]", "two robots"),
         ] {
             assert!(read(text).unwrap_err().contains(name), "{text}");
         }

@@ -5,6 +5,7 @@
 mod lifetime;
 mod questions;
 mod roles;
+mod ros;
 mod site;
 mod streams;
 mod words;

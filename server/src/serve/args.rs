@@ -9,6 +9,8 @@ use clap::Args;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
+use toponym_proto::Invalid;
+use toponym_ros::live::RosRobot;
 use tracing::{error, info};
 
 /// How often it is looked whether users have changed.
@@ -38,9 +40,23 @@ pub struct ServeArgs {
     /// Words and names of your site, one to a line: "refectory = canteen", "name: Room to Grow"
     #[arg(long, value_name = "FILE")]
     pub lexicon: Option<PathBuf>,
+    /// Map for a robot that speaks ROS 2 (rmw_zenoh), by the router on it; nothing is installed there. By default its
+    /// name is "robot", and its router at tcp/localhost:7447. Again for each robot
+    #[arg(
+        long,
+        value_name = "NAME=ENDPOINT[,domain=N][,namespace=/r1][,map=ID][,topic=/scan]",
+        num_args = 0..=1,
+        default_missing_value = "",
+        value_parser = parse_robot
+    )]
+    pub ros: Vec<RosRobot>,
     /// Log what people say, too
     #[arg(long)]
     pub log_speech: bool,
+}
+
+fn parse_robot(text: &str) -> Result<RosRobot, Invalid> {
+    text.parse()
 }
 
 impl ServeArgs {
@@ -58,6 +74,7 @@ impl ServeArgs {
         }
         config.http = self.http.clone().or(config.http);
         config.lexicon = self.lexicon.clone().or(config.lexicon);
+        config.ros.extend(self.ros.iter().cloned());
         config.log_speech |= self.log_speech;
         config.check()?;
         Ok(config)

@@ -142,7 +142,7 @@ impl Server {
         let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, records);
         maps.start_saved()?;
         let (door, arrivals) = Door::new(board.clone(), &config);
-        let limits = config.limits.clone();
+        let (limits, robots) = (config.limits.clone(), config.ros.clone());
         let intake = Intake::new(config, board.clone(), outbox.clone(), maps);
         let intake =
             std::thread::Builder::new().name("intake".into()).spawn(move || intake.run(&arrivals))?;
@@ -150,6 +150,10 @@ impl Server {
         answer_queries(&session, &board, &limits).await?;
         let token = session.liveliness().declare_token(keys.alive(&session.zid().to_string())).await?;
         watchers.push(watch::tell_systemd(board.clone()));
+        for robot in robots {
+            let site = board.site.clone();
+            watchers.push(tokio::spawn(toponym_ros::live::run(robot, site, session.clone())));
+        }
         let server =
             Self { session, board, door, intake, outbox, publisher, _token: token, watchers, endpoints };
         info!(site = server.board.site, endpoints = server.endpoints.join(" "), "listening");

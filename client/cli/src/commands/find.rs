@@ -4,14 +4,13 @@ use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::time::Duration;
+use toponym::told::{is_found, where_text};
 use toponym::{Connection, Planner};
-use toponym_proto::answer::{Candidate, LabelsReply, WhatReply, WhereReply};
+use toponym_proto::answer::{LabelsReply, WhatReply};
 use toponym_proto::regions::{Region, RegionsReply};
 
 /// Less likely names of rooms are not told in text.
 const CALLED_MIN: f64 = 0.3;
-/// Less likely alternatives are left out of the text (not of the JSON).
-const SHOWN_MIN: f64 = 0.005;
 
 /// Arguments of `where`.
 #[derive(Debug, clap::Args)]
@@ -52,7 +51,7 @@ pub async fn find(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, F
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.where_is_in(&args.name, args.lang.as_deref()).await?;
     print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
-    Ok(exit_code(&reply))
+    Ok(if is_found(&reply) { exit::FOUND } else { exit::NOT_KNOWN })
 }
 
 pub async fn nearest(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
@@ -60,13 +59,7 @@ pub async fn nearest(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.nearest(&args.name, args.lang.as_deref()).await?;
     print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
-    Ok(exit_code(&reply))
-}
-
-/// Whether something is rather somewhere than nowhere.
-fn exit_code(reply: &WhereReply) -> u8 {
-    let likeliest = reply.candidates.iter().map(|c| c.probability).fold(0.0, f64::max);
-    if likeliest > 0.0 && likeliest >= reply.p_none { exit::FOUND } else { exit::NOT_KNOWN }
+    Ok(if is_found(&reply) { exit::FOUND } else { exit::NOT_KNOWN })
 }
 
 /// Arguments of `what`.
@@ -124,54 +117,12 @@ fn print(text: &str) -> Result<(), Failure> {
     Ok(std::io::stdout().write_all(text.as_bytes())?)
 }
 
-fn where_text(reply: &WhereReply) -> String {
-    let Some((best, others)) = reply.candidates.split_first() else {
-        let suggestions = &reply.resolved.suggestions;
-        let offer = if suggestions.is_empty() {
-            "`toponym labels` lists what is".to_owned()
-        } else {
-            format!("did you mean {}?", suggestions.join(" or "))
-        };
-        return format!("{}: not known here; {offer}\n", reply.name);
-    };
-    let mut text = format!("{}: {}\n", shown(best), candidate_text(best));
-    for other in others.iter().filter(|c| c.probability >= SHOWN_MIN) {
-        let _ = writeln!(text, "  or {}: {}", shown(other), candidate_text(other));
-    }
-    if reply.p_none >= SHOWN_MIN {
-        let _ = writeln!(text, "  or nowhere in the map: probability {:.2}", reply.p_none);
-    }
-    text
-}
-
 fn what_text(reply: &WhatReply) -> String {
     let names: Vec<String> = reply.names.iter().map(|n| format!("{} ({:.2})", n.shown, n.p)).collect();
     let names =
         if names.is_empty() { "nobody told what this is called".to_owned() } else { names.join(", ") };
     let space = reply.region.zip(reply.kind.as_ref()).map(|(id, kind)| format!(", a {kind} (region {id})"));
     format!("x {:.2} m, y {:.2} m{}: {names}\n", reply.x_m, reply.y_m, space.unwrap_or_default())
-}
-
-/// Its name as a guide spells it.
-fn shown(c: &Candidate) -> &str {
-    if c.shown.is_empty() { &c.label } else { &c.shown }
-}
-
-fn candidate_text(c: &Candidate) -> String {
-    let from_robot = c.from_robot.as_ref().map_or(String::new(), |from| {
-        format!("{:.1} m away, {}, ", from.distance_m, bearing_text(from.bearing_rad))
-    });
-    let walk = c.walk_m.map_or(String::new(), |m| format!("{m:.1} m to go, "));
-    format!("{from_robot}{walk}probability {:.2} (x {:.2} m, y {:.2} m)", c.probability, c.x_m, c.y_m)
-}
-
-fn bearing_text(bearing_rad: f64) -> String {
-    match bearing_rad.to_degrees().round() as i64 {
-        0 => "straight ahead".into(),
-        180 | -180 => "right behind".into(),
-        left @ 1.. => format!("{left}° to the left"),
-        right => format!("{}° to the right", -right),
-    }
 }
 
 fn labels_text(reply: &LabelsReply) -> String {
@@ -209,7 +160,7 @@ fn rooms_text(reply: &RegionsReply) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use toponym_proto::answer::{FromRobot, LabelEntry, MapIdentity, Resolved};
+    use toponym_proto::answer::{LabelEntry, MapIdentity};
     use toponym_proto::regions::{Doorway, RegionName};
 
     #[test]
@@ -233,76 +184,6 @@ mod tests {
             "7     room       20.0 m²  no name, leads to 0",
         ];
         assert_eq!(text.lines().collect::<Vec<_>>(), rows);
-    }
-
-    fn candidate(probability: f64, bearing_rad: Option<f64>) -> Candidate {
-        Candidate {
-            region: 1,
-            label: "gym".into(),
-            shown: "gym".into(),
-            probability,
-            p_is: 0.9,
-            x_m: 1.0,
-            y_m: -2.0,
-            yaw_rad: 0.0,
-            cov: [0.0; 9],
-            polygon_m: Vec::new(),
-            goal: None,
-            from_robot: bearing_rad.map(|bearing_rad| FromRobot {
-                robot: "r".into(),
-                distance_m: 8.25,
-                bearing_rad,
-            }),
-            walk_m: None,
-            because: Vec::new(),
-        }
-    }
-
-    fn reply(candidates: Vec<Candidate>) -> WhereReply {
-        WhereReply {
-            v: 1,
-            query: "where".into(),
-            name: "gym".into(),
-            resolved: Resolved::default(),
-            map: MapIdentity::default(),
-            stamp: toponym_proto::Stamp::default(),
-            p_none: 0.1,
-            unresolved: 0.0,
-            candidates,
-        }
-    }
-
-    #[test]
-    fn where_tells_distance_bearing_probability_and_alternatives() {
-        let text = where_text(&reply(vec![
-            candidate(0.7, Some(0.5)),
-            candidate(0.2, Some(-0.5)),
-            candidate(0.0, None),
-        ]));
-        assert_eq!(
-            text,
-            "gym: 8.2 m away, 29° to the left, probability 0.70 (x 1.00 m, y -2.00 m)\n  \
-             or gym: 8.2 m away, 29° to the right, probability 0.20 (x 1.00 m, y -2.00 m)\n  \
-             or nowhere in the map: probability 0.10\n"
-        );
-    }
-
-    #[test]
-    fn bearings_are_told_from_the_nose() {
-        for (degrees, text) in [
-            (0.2, "straight ahead"),
-            (90.0, "90° to the left"),
-            (-45.0, "45° to the right"),
-            (-179.9, "right behind"),
-            (180.0, "right behind"),
-        ] {
-            assert_eq!(bearing_text(f64::to_radians(degrees)), text);
-        }
-    }
-
-    #[test]
-    fn an_unknown_name_is_told_as_such() {
-        assert!(where_text(&reply(Vec::new())).starts_with("gym: not known here"));
     }
 
     #[test]
