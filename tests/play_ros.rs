@@ -48,6 +48,7 @@ struct Played {
     topic: String,
     kind: String,
     data: Vec<u8>,
+    is_lost: bool,
 }
 
 fn messages(args: &Args) -> anyhow::Result<(Vec<Played>, Plan)> {
@@ -57,13 +58,11 @@ fn messages(args: &Args) -> anyhow::Result<(Vec<Played>, Plan)> {
     while let Some(raw) = bag.next() {
         let topic = bag.topics()[raw.topic].clone();
         let _ = survey.take(&topic, &raw.data);
-        if topic.kind == kind::SCAN && rng.random::<f64>() < args.lose {
-            continue;
-        }
+        let is_lost = topic.kind == kind::SCAN && rng.random::<f64>() < args.lose;
         let late_s = if topic.name.ends_with("/tf") { args.late_tf } else { 0.0 };
         let at_ns = raw.received_ns + (late_s * 1e9) as i64;
         let name = format!("{}{}", args.namespace, topic.name);
-        all.push(Played { at_ns, topic: name, kind: topic.kind, data: raw.data });
+        all.push(Played { at_ns, topic: name, kind: topic.kind, data: raw.data, is_lost });
     }
     all.sort_by_key(|m| m.at_ns);
     Ok((all, survey.plan().map_err(anyhow::Error::msg)?))
@@ -85,6 +84,10 @@ async fn main() -> anyhow::Result<()> {
     for message in &all {
         let due = Duration::from_secs_f64((message.at_ns - first_ns) as f64 * 1e-9 / args.rate);
         tokio::time::sleep(due.saturating_sub(start.elapsed())).await;
+        if message.is_lost {
+            robot.lose(&message.topic, &message.kind);
+            continue;
+        }
         if message.kind == kind::SCAN {
             let scan: LaserScan = cdr::read(&message.data).map_err(anyhow::Error::msg)?;
             scans.push(scan.header.stamp.ns());

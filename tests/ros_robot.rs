@@ -105,6 +105,13 @@ impl RosRobot {
         }
     }
 
+    /// As if a message had got lost on its way.
+    pub fn lose(&self, topic: &str, kind: &str) {
+        if let Some(writer) = self.writers.get(&(topic.to_owned(), kind.to_owned())) {
+            writer.skip();
+        }
+    }
+
     /// Publishes a message.
     ///
     /// # Errors

@@ -6,6 +6,9 @@
 mod mcap;
 mod scratch;
 mod sqlite;
+mod write;
+
+pub use self::write::BagWriter;
 
 use self::mcap::McapPart;
 use self::sqlite::SqlitePart;

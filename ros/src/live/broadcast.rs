@@ -4,10 +4,11 @@ use super::Shared;
 use super::mouth::{Speaker, Writer};
 use super::session::now_ns;
 use crate::msg::{
-    Header, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, Quaternion, TFMessage, Time,
-    Transform, TransformStamped, Vector3,
+    Header, PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, TFMessage, Time, Transform,
+    TransformStamped, Vector3,
 };
 use crate::plan::kind;
+use crate::shown::{about_z, posed};
 use crate::wire::Qos;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
@@ -19,8 +20,6 @@ use tracing::{info, warn};
 
 /// Another one who tells it is gone after so long.
 const OTHERS_NS: i64 = 2_000_000_000;
-/// A robot that is silent for so long has stopped; its clock is not carried on.
-const SILENT: Duration = Duration::from_secs(1);
 /// Covariance of what is not measured.
 const UNMEASURED: f64 = 1e6;
 
@@ -36,7 +35,7 @@ pub async fn broadcast(shared: Arc<Shared>, speaker: Arc<Speaker>) -> Result<(),
     let mut ticks = tokio::time::interval(Duration::from_secs_f64(shared.robot.transform_publish_period_s));
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
     let mut pose = shared.pose.subscribe();
-    let (mut newest_ns, mut was_silent) = (i64::MIN, false);
+    let (mut newest_ns, mut was_silent) = (0, false);
     loop {
         tokio::select! {
             _ = ticks.tick() => {
@@ -45,8 +44,11 @@ pub async fn broadcast(shared: Arc<Shared>, speaker: Arc<Speaker>) -> Result<(),
                     was_silent = others;
                     tell_others(&shared, others);
                 }
-                let Some(stamp_ns) = ahead_ns(&shared).filter(|_| !others) else { continue };
-                newest_ns = newest_ns.max(stamp_ns);
+                // Until the next transform is there, whatever is stamped meanwhile must be before this one.
+                let ahead_ns = shared.clock.borrow().in_ns(Instant::now(), shared.robot.transform_timeout_s);
+                let Some(stamp_ns) = ahead_ns.filter(|_| !others) else { continue };
+                // Not back by a little, where the clock was carried on too far; but anew with it.
+                newest_ns = if newest_ns - stamp_ns < OTHERS_NS { newest_ns.max(stamp_ns) } else { stamp_ns };
                 let Some(message) = map_from_odom(&shared, newest_ns) else { continue };
                 transforms.write(&message).await?;
             }
@@ -79,14 +81,6 @@ fn tell_others(shared: &Shared, others: bool) {
     }
 }
 
-/// The robot's time now, and a little more: until the next transform is there, all of them must be within.
-fn ahead_ns(shared: &Shared) -> Option<i64> {
-    let (stamp_ns, came) = (*shared.clock.borrow())?;
-    // At zero, simulated time has not begun.
-    let since = Instant::now().saturating_duration_since(came).min(SILENT).as_nanos() as i64;
-    (stamp_ns != 0).then_some(stamp_ns + since + (shared.robot.transform_timeout_s * 1e9) as i64)
-}
-
 fn map_from_odom(shared: &Shared, stamp_ns: i64) -> Option<TFMessage> {
     let odom = shared.plan.borrow().as_ref()?.moving()?.parent.clone();
     let pose = shared.pose.borrow().as_ref()?.map_from_odom;
@@ -98,21 +92,9 @@ fn map_from_odom(shared: &Shared, stamp_ns: i64) -> Option<TFMessage> {
     Some(TFMessage { transforms: vec![TransformStamped { header, child_frame_id: odom, transform }] })
 }
 
-/// A turn about the upright axis.
-pub fn about_z(yaw_rad: f64) -> Quaternion {
-    let (z, w) = (0.5 * yaw_rad).sin_cos();
-    Quaternion { x: 0.0, y: 0.0, z, w }
-}
-
-/// A pose on the floor, in ROS's words.
-pub fn posed(pose: &Pose) -> crate::msg::Pose {
-    let position = Vector3 { x: pose.x_m, y: pose.y_m, z: 0.0 };
-    crate::msg::Pose { position, orientation: about_z(pose.yaw_rad) }
-}
-
 /// A goal in the map, now.
 pub fn goal(shared: &Shared, pose: &Pose) -> PoseStamped {
-    let stamp_ns = shared.clock.borrow().map_or(0, |(ns, _)| ns);
+    let stamp_ns = shared.clock.borrow().newest().map_or(0, |(ns, _)| ns);
     let header = Header { stamp: Time::from(stamp_ns), frame_id: shared.robot.map_frame.clone() };
     PoseStamped { header, pose: posed(pose) }
 }

@@ -8,7 +8,7 @@ use toponym::log::Options;
 use toponym_proto::Message;
 
 /// All lasers and transforms of a robot have been heard after so long by its stamps.
-const LOOK_NS: i64 = 500_000_000;
+const LOOK_NS: i64 = 300_000_000;
 /// What is not known after so long is supposed.
 const LOOK_MAX_NS: i64 = 8_000_000_000;
 /// Kept until it is known what they are, bytes.

@@ -18,6 +18,8 @@ const AGAIN: Duration = Duration::from_secs(60);
 const SKEW_S: f64 = 2.0;
 /// By more than this it is another kind of clock.
 const OTHER_CLOCK_S: f64 = 86_400.0;
+/// Senders whose numbers are watched.
+const SENDERS_MAX: usize = 1000;
 /// How long the router may take to tell who is there.
 const TOKENS_WAIT: Duration = Duration::from_secs(2);
 
@@ -31,6 +33,10 @@ pub struct Found {
     /// Why there is no plan.
     pub problem: Option<String>,
     dropped: u64,
+    /// The newest number of each sender on each topic.
+    numbers: BTreeMap<(String, [u8; 16]), i64>,
+    /// By topic: numbers that never came.
+    lost: BTreeMap<String, u64>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -54,10 +60,34 @@ impl Found {
         let came =
             self.topics.entry(key).or_insert(Came { first_ns: arrived.received_ns, ..Came::default() });
         (came.count, came.last_ns) = (came.count + 1, arrived.received_ns);
+        self.count_lost(arrived);
         if dropped > self.dropped {
             let lost = dropped - self.dropped;
             self.dropped = dropped;
             warn!("{lost} messages of a robot are lost: they come faster than they can be taken in");
+        }
+    }
+
+    /// Who sends numbers what he sends. The first that is missing is told, and then each doubling.
+    fn count_lost(&mut self, arrived: &Arrived) {
+        let Some((number, gid)) = arrived.numbered else { return };
+        let topic = &arrived.topic.name;
+        if self.numbers.len() >= SENDERS_MAX && !self.numbers.contains_key(&(topic.clone(), gid)) {
+            return;
+        }
+        let last = self.numbers.insert((topic.clone(), gid), number).unwrap_or(number - 1);
+        let Some(missing) = u64::try_from(number - last - 1).ok().filter(|missing| *missing > 0) else {
+            return;
+        };
+        let lost = self.lost.entry(topic.clone()).or_default();
+        let before = *lost;
+        *lost += missing;
+        if before == 0 || before.ilog2() < lost.ilog2() {
+            warn!(
+                topic,
+                lost = *lost,
+                "messages got lost on the way from the robot: is its network good enough?"
+            );
         }
     }
 
@@ -210,7 +240,7 @@ pub async fn tell(shared: Arc<Shared>, ros: Session) -> Result<(), String> {
             Some(_) => BTreeSet::new(),
             None => publishers(&ros).await.map_err(|e| e.to_string())?,
         };
-        let lag_s = shared.clock.borrow().map(|(stamp_ns, came)| {
+        let lag_s = shared.clock.borrow().newest().map(|(stamp_ns, came)| {
             (super::session::now_ns() - stamp_ns) as f64 * 1e-9 - came.elapsed().as_secs_f64()
         });
         let report = shared.found().report(&shared.robot, plan.as_ref(), &told, lag_s);
@@ -248,7 +278,20 @@ mod tests {
 
     fn arrived(name: &str, kind: &str, received_ns: i64) -> Arrived {
         let topic = Topic { name: name.into(), kind: kind.into(), is_cdr: true };
-        Arrived { topic, received_ns, data: Vec::new() }
+        Arrived { topic, received_ns, numbered: None, data: Vec::new() }
+    }
+
+    #[test]
+    fn numbers_that_never_come_are_lost() {
+        let mut found = Found::default();
+        for number in [7, 8, 11, 12, 3] {
+            found.see(
+                &Arrived { numbered: Some((number, [1; 16])), ..arrived("/scan", kind::SCAN, number) },
+                0,
+            );
+        }
+        found.see(&Arrived { numbered: Some((90, [2; 16])), ..arrived("/scan", kind::SCAN, 20) }, 0);
+        assert_eq!(found.lost["/scan"], 2, "another sender, and one that begins anew, lose nothing");
     }
 
     fn missing(found: &Found, told: &[wire::Told]) -> String {

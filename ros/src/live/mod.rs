@@ -9,6 +9,7 @@
 
 mod asked;
 mod broadcast;
+mod clock;
 pub mod feed;
 mod found;
 mod mouth;
@@ -24,7 +25,7 @@ use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::sync::atomic::AtomicI64;
 use std::sync::{Arc, Mutex};
-use std::time::{Duration, Instant};
+use std::time::Duration;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
 use toponym_proto::answer::PoseOut;
@@ -163,8 +164,8 @@ struct Shared {
     plan: watch::Sender<Option<Plan>>,
     /// Where its transforms go.
     tf_topic: watch::Sender<String>,
-    /// The newest stamp of its clock, and when it came.
-    clock: watch::Sender<Option<(i64, Instant)>>,
+    /// Its clock.
+    clock: watch::Sender<clock::RobotClock>,
     /// Where it is.
     pose: watch::Sender<Option<PoseOut>>,
     /// When somebody else last told where odometry lies in a map, Unix nanoseconds.
@@ -212,7 +213,7 @@ async fn bridge(robot: &RosRobot, site: &str, own: &Session, ros: &Session) -> R
         own: own.clone(),
         plan: watch::Sender::new(None),
         tf_topic: watch::Sender::new("/tf".into()),
-        clock: watch::Sender::new(None),
+        clock: watch::Sender::new(clock::RobotClock::default()),
         pose: watch::Sender::new(None),
         others_ns: AtomicI64::new(0),
         spoken_of: Mutex::default(),

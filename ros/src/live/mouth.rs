@@ -126,6 +126,11 @@ impl Writer {
         self.put(cdr::write(message)?).await
     }
 
+    /// Passes over a number, as if its message had got lost.
+    pub fn skip(&self) {
+        self.seq.fetch_add(1, Ordering::Relaxed);
+    }
+
     /// Writes a message that is CDR already.
     ///
     /// # Errors

@@ -28,6 +28,8 @@ pub struct Arrived {
     pub topic: Topic,
     /// When, Unix nanoseconds.
     pub received_ns: i64,
+    /// Its number, and who sent it.
+    pub numbered: Option<(i64, [u8; 16])>,
     /// CDR.
     pub data: Vec<u8>,
 }
@@ -132,7 +134,9 @@ fn hand_over(sender: &Sender<Arrived>, dropped: &AtomicU64, sample: &Sample) {
         return;
     }
     let data = sample.payload().to_bytes().into_owned();
-    let arrived = Arrived { topic: Topic { name, kind, is_cdr: true }, received_ns: now_ns(), data };
+    let numbered = sample.attachment().and_then(|bytes| wire::attached(&bytes.to_bytes()));
+    let arrived =
+        Arrived { topic: Topic { name, kind, is_cdr: true }, received_ns: now_ns(), numbered, data };
     if sender.try_send(arrived).is_err() {
         dropped.fetch_add(1, Ordering::Relaxed);
     }

@@ -32,19 +32,13 @@ pub async fn take_in(shared: Arc<Shared>, mut ear: Ear) -> Result<(), String> {
     while let Some(arrived) = ear.arrivals.recv().await {
         shared.found().see(&arrived, ear.dropped.load(Ordering::Relaxed));
         notice_others(&shared, &arrived);
-        let Arrived { topic, received_ns, data } = arrived;
+        let Arrived { topic, received_ns, data, .. } = arrived;
         if let Err(why) = feed.take(&topic, received_ns, data, &mut out) {
             shared.found().unused(&topic.name, why);
         }
         shared.found().problem = feed.problem().map(str::to_owned);
         let newest_ns = feed.newest_ns();
-        shared.clock.send_if_modified(|clock| {
-            let is_newer = newest_ns.is_some_and(|ns| clock.is_none_or(|(known, _)| ns != known));
-            if let Some(ns) = newest_ns.filter(|_| is_newer) {
-                *clock = Some((ns, Instant::now()));
-            }
-            is_newer
-        });
+        shared.clock.send_if_modified(|clock| newest_ns.is_some_and(|ns| clock.see(ns, Instant::now())));
         for fed in out.drain(..) {
             let sent = match fed {
                 Fed::Begins(plan) => {

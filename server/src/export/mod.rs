@@ -4,12 +4,14 @@
 //! Snapshot ─┬─ nav2 ──▶ map.yaml, map.pgm        what Nav2's map server loads
 //!           ├─ route ─▶ route.geojson            what Nav2's route server plans on
 //!           ├─ rooms ─▶ rooms.geojson            outlines, doorways, names; metres
+//!           ├─ mcap ──▶ map.mcap                 ROS messages, for Foxglove, rerun and `ros2 bag play`
 //!           ├─ g2o ───▶ graph.g2o                what pose graph smoothers read
 //!           └─ json ──▶ map.json, map.schema.json   rooms, names, sentences
 //! ```
 
 mod g2o;
 mod json;
+mod mcap;
 mod nav2;
 mod rooms;
 mod route;
@@ -46,10 +48,13 @@ pub struct ExportArgs {
     /// graph.g2o: poses and the best graph's transforms, for pose graph smoothers
     #[arg(long)]
     g2o: bool,
+    /// map.mcap: map, markers, the way, what was seen and said, as ROS messages for Foxglove, rerun and `ros2 bag play`
+    #[arg(long)]
+    mcap: bool,
     /// map.json, with its JSON Schema beside it: rooms, names, sentences
     #[arg(long)]
     json: bool,
-    /// Edge of a cell of map.pgm, metres
+    /// Edge of a cell of map.pgm and map.mcap, metres
     #[arg(long, value_name = "M", default_value_t = 0.05, value_parser = resolution)]
     resolution_m: f64,
 }
@@ -85,7 +90,7 @@ fn write(file: &Path, content: &[u8]) -> Result<()> {
 }
 
 fn files(args: &ExportArgs, snapshot: &Snapshot) -> Result<Vec<Content>> {
-    let all = !(args.nav2 || args.route_graph || args.geojson || args.g2o || args.json);
+    let all = !(args.nav2 || args.route_graph || args.geojson || args.g2o || args.mcap || args.json);
     let mut files = Vec::new();
     if args.nav2 || all {
         files.extend(nav2::files(&snapshot.grid(args.resolution_m)));
@@ -98,6 +103,9 @@ fn files(args: &ExportArgs, snapshot: &Snapshot) -> Result<Vec<Content>> {
     }
     if args.g2o || all {
         files.push(("graph.g2o", g2o::text(snapshot).into_bytes()));
+    }
+    if args.mcap || all {
+        files.push(("map.mcap", mcap::file(snapshot, args.resolution_m)?));
     }
     if args.json || all {
         files.push(("map.json", serde_json::to_vec_pretty(&json::map(snapshot))?));

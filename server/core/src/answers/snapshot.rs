@@ -18,6 +18,7 @@ use crate::language::act::{About, Act, Head, Question};
 use crate::language::{Content, GroundPlace, Name, Speech};
 use crate::regions::Rooms;
 use crate::regions::occupancy::{Plot, grid};
+use crate::scan::cloud::Point;
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
 use crate::track::places::OpenPlace;
@@ -170,6 +171,11 @@ impl Snapshot {
     /// Occupancy grid of the best particle, as far as anything is known.
     pub fn grid(&self, resolution_m: f64) -> Grid {
         grid(&self.posed(), resolution_m)
+    }
+
+    /// What each place of the best graph saw, in its own frame: its stamp, its pose in the map, its surfaces.
+    pub fn clouds(&self) -> impl Iterator<Item = (StampNs, Pose2, &[Point])> {
+        self.places.iter().zip(&self.poses).map(|(p, pose)| (p.stamp_ns, *pose, &p.content.cloud[..]))
     }
 
     fn posed(&self) -> Vec<(Pose2, Arc<Place>)> {
