@@ -9,6 +9,9 @@ use toponym_proto::keys::{DEFAULT_ENDPOINT, DEFAULT_SITE, check_id, check_link};
 use toponym_proto::{Invalid, Limits};
 use toponym_ros::live::RosRobot;
 
+/// Where the pages are by default.
+pub const DEFAULT_HTTP: &str = "127.0.0.1:7458";
+
 /// Settings of `toponym-server serve`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(default, deny_unknown_fields)]
@@ -17,8 +20,11 @@ pub struct ServerConfig {
     pub site: String,
     /// Zenoh endpoints to listen on. Beyond loopback everybody on the network can connect.
     pub listen: Vec<String>,
-    /// Address of `/healthz` and `/metrics` (Prometheus), such as `127.0.0.1:7458`; everybody who reaches it may read them.
+    /// Address of the pages, of `/healthz` and of `/metrics` (Prometheus); everybody who reaches it may read these. Pages
+    /// are served to this machine alone.
     pub http: Option<String>,
+    /// Other names under which pages are asked for, such as `maps.example.org` of a proxy in front.
+    pub http_hosts: Vec<String>,
     /// Words and names of the site's own, see `toponym_core::language::glossary`.
     pub lexicon: Option<PathBuf>,
     /// Folder of the maps: a journal and checkpoints of each.
@@ -39,6 +45,8 @@ pub struct ServerConfig {
     pub limits: Limits,
     /// Who may do what.
     pub access: AccessConfig,
+    /// File in which poses, maps and what is heard are written as ROS messages, for Foxglove and rerun.
+    pub mcap: Option<PathBuf>,
     /// Robots that speak ROS 2.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub ros: Vec<RosRobot>,
@@ -74,7 +82,8 @@ impl Default for ServerConfig {
         Self {
             site: DEFAULT_SITE.into(),
             listen: vec![DEFAULT_ENDPOINT.into()],
-            http: None,
+            http: Some(DEFAULT_HTTP.into()),
+            http_hosts: Vec::new(),
             lexicon: None,
             data: "./toponym-data".into(),
             hold_back_s: 0.5,
@@ -85,6 +94,7 @@ impl Default for ServerConfig {
             log_speech: false,
             limits: Limits::default(),
             access: AccessConfig::default(),
+            mcap: None,
             ros: Vec::new(),
             mapper: toponym_core::Config::default(),
         }

@@ -20,3 +20,4 @@ pub mod map;
 pub mod picture;
 pub mod serve;
 pub mod store;
+pub mod web;

@@ -1,10 +1,12 @@
 //! Robots that speak ROS 2, live.
 
 use crate::site::{Folder, PATIENCE, Site, drive, settings};
+use std::collections::BTreeMap;
 use std::time::Duration;
 use tokio::time::{interval, timeout};
 use toponym_proto::answer::PoseOut;
 use toponym_proto::{Message, Pose, Stamp};
+use toponym_ros::bag::Bag;
 use toponym_ros::cdr;
 use toponym_ros::live::RosRobot as Settings;
 use toponym_ros::msg::{
@@ -67,7 +69,7 @@ struct Scene {
     robot: RosRobot,
     site: Site,
     last: Stamp,
-    _folder: Folder,
+    folder: Folder,
 }
 
 /// The drive through the hall, sent by a robot in this namespace and domain; the mounting before the server was there.
@@ -77,6 +79,7 @@ async fn scene(space: &str, domain: u32) -> Scene {
     let drive = drive("r1", "main");
     send(&mut robot, space, &drive[0]).await;
     let mut config = settings(&folder);
+    config.mcap = Some(folder.0.join("tour.mcap"));
     config.ros.push(Settings {
         robot: "r1".into(),
         endpoint: robot.endpoint().into(),
@@ -91,7 +94,7 @@ async fn scene(space: &str, domain: u32) -> Scene {
         send(&mut robot, space, message).await;
     }
     let last = Stamp { ns: drive[80].header().unwrap().stamp.ns };
-    Scene { robot, site, last, _folder: folder }
+    Scene { robot, site, last, folder }
 }
 
 impl Scene {
@@ -118,9 +121,16 @@ impl Scene {
         serde_json::from_value(pose).ok()
     }
 
-    async fn stop(self) {
+    /// Stops both; what the server has written of it, by topic.
+    async fn stop(self) -> BTreeMap<String, usize> {
         self.robot.stop().await.unwrap();
         self.site.stop().await;
+        let mut bag = Bag::open(&self.folder.0.join("tour.mcap")).unwrap();
+        let mut count = BTreeMap::new();
+        while let Some(raw) = bag.next() {
+            *count.entry(bag.topics()[raw.topic].name.clone()).or_default() += 1;
+        }
+        count
     }
 }
 
@@ -146,7 +156,7 @@ async fn a_ros_robot_is_mapped_and_told_where_it_is() {
         let told = pose.map_from_odom;
         let off = (x_m - told.x_m).abs() + (y_m - told.y_m).abs() + (yaw_rad - told.yaw_rad).abs();
         assert!(off < 1e-3, "{found:?} {told:?}");
-        scene.stop().await;
+        assert!(scene.stop().await["/tf"] >= 40, "each pose is written");
     }
 }
 

@@ -167,3 +167,95 @@ impl Feed {
         self.stream.as_ref().map(|(_, stream)| stream.newest_ns()).filter(|&ns| ns != i64::MIN)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cdr;
+    use crate::msg::{Header, LaserScan, TFMessage, Time, Transform, TransformStamped};
+
+    const TENTH_NS: i64 = 100_000_000;
+
+    /// A robot as it comes.
+    struct Robot {
+        feed: Feed,
+        out: Vec<Fed>,
+    }
+
+    impl Robot {
+        fn new() -> Self {
+            Self { feed: Feed::new(Options::default(), &[]), out: Vec::new() }
+        }
+
+        fn take(&mut self, name: &str, kind: &str, data: Vec<u8>) -> Result<(), String> {
+            let topic = Topic { name: name.into(), kind: kind.into(), is_cdr: true };
+            self.feed.take(&topic, 0, data, &mut self.out)
+        }
+
+        fn transform(&mut self, topic: &str, ns: i64, parent: &str, child: &str) {
+            let header = Header { stamp: Time::from(ns), frame_id: parent.into() };
+            let transform =
+                TransformStamped { header, child_frame_id: child.into(), transform: Transform::default() };
+            let data = cdr::write(&TFMessage { transforms: vec![transform] }).unwrap();
+            let _ = self.take(topic, kind::TF, data);
+        }
+
+        fn scan(&mut self, topic: &str, ns: i64) {
+            let header = Header { stamp: Time::from(ns), frame_id: "laser".into() };
+            let ranges = vec![1.0; 8];
+            let scan =
+                LaserScan { header, range_max: 9.0, angle_increment: 0.1, ranges, ..LaserScan::default() };
+            let _ = self.take(topic, kind::SCAN, cdr::write(&scan).unwrap());
+        }
+
+        /// Some seconds of it.
+        fn drive(&mut self, from_ns: i64, lasers: &[&str]) {
+            for k in 0..30 {
+                let ns = from_ns + k * TENTH_NS;
+                self.transform("/tf", ns, "odom", "base");
+                lasers.iter().for_each(|topic| self.scan(topic, ns));
+            }
+        }
+
+        fn plans(&self) -> Vec<&Plan> {
+            self.out
+                .iter()
+                .filter_map(|fed| if let Fed::Begins(plan) = fed { Some(plan) } else { None })
+                .collect()
+        }
+
+        fn scans(&self) -> usize {
+            self.out.iter().filter(|fed| matches!(fed, Fed::Message(Message::Scan(_)))).count()
+        }
+    }
+
+    #[test]
+    fn what_comes_before_it_is_known_what_it_is_is_not_lost() {
+        let mut robot = Robot::new();
+        robot.transform("/tf_static", 0, "base", "laser");
+        robot.drive(1_000_000_000, &["/scan"]);
+        assert_eq!((robot.plans().len(), robot.scans()), (1, 30));
+    }
+
+    #[test]
+    fn a_laser_or_a_mounting_that_comes_later_begins_a_stream_anew() {
+        let mut robot = Robot::new();
+        robot.transform("/tf_static", 0, "base", "laser");
+        robot.drive(1_000_000_000, &["/front"]);
+        robot.drive(4_000_000_000, &["/front", "/back"]);
+        let lasers: Vec<usize> = robot.plans().iter().map(|plan| plan.lasers.len()).collect();
+        assert_eq!(lasers, [1, 2]);
+        assert_eq!(robot.scans(), 90);
+    }
+
+    #[test]
+    fn a_clock_that_steps_back_begins_a_stream_anew() {
+        let mut robot = Robot::new();
+        robot.transform("/tf_static", 0, "base", "laser");
+        robot.drive(50_000_000_000, &["/scan"]);
+        robot.drive(1_000_000_000, &["/scan"]);
+        assert_eq!(robot.plans().len(), 2);
+        // Those by which it was noticed are lost.
+        assert!(robot.scans() >= 30 + 30 - BACK_MAX as usize, "{}", robot.scans());
+    }
+}

@@ -18,7 +18,7 @@ mod session;
 mod take_in;
 
 pub use mouth::{Speaker, Writer};
-pub use session::open;
+pub use session::{now_ns, open};
 
 use crate::plan::Plan;
 use serde::{Deserialize, Serialize};
@@ -95,6 +95,10 @@ impl RosRobot {
         check_id("ros.robot", &self.robot)?;
         check_id("ros.map", &self.map)?;
         check_link("ros.endpoint", &self.endpoint)?;
+        if !self.endpoint.split_once('/').is_some_and(|(kind, at)| !kind.is_empty() && at.contains(':')) {
+            let message = format!("is {:?}, must be such as {DEFAULT_ENDPOINT}", self.endpoint);
+            return Err(Invalid::new("ros.endpoint", message));
+        }
         let is_name = |c: char| c.is_ascii_alphanumeric() || "_/".contains(c);
         let is_space =
             |name: &str| name.starts_with('/') && !name.ends_with('/') && name.chars().all(is_name);

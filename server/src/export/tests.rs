@@ -127,6 +127,33 @@ fn a_route_graph_hangs_together_and_leads_from_name_to_name() {
     assert!(["gym", "kitchen", "doorway"].iter().all(|c| classes.contains(c)), "{classes:?}");
 }
 
+#[test]
+fn a_bag_of_the_map_has_it_all_and_is_read_back() {
+    let exported = Exported::new("mcap", &["--mcap"]);
+    let mut bag = toponym_ros::bag::Bag::open(&exported.0.join("out/map.mcap")).unwrap();
+    let (mut count, mut sentences) = (std::collections::BTreeMap::new(), Vec::new());
+    while let Some(raw) = bag.next() {
+        let topic = &bag.topics()[raw.topic];
+        assert!(topic.is_cdr);
+        *count.entry(topic.name.clone()).or_insert(0) += 1;
+        match topic.name.as_str() {
+            "/map" => {
+                let map: toponym_ros::msg::OccupancyGrid = toponym_ros::cdr::read(&raw.data).unwrap();
+                assert_eq!(map.data.len(), (map.info.width * map.info.height) as usize);
+            }
+            "/speech" => {
+                let text: toponym_ros::msg::StringMsg = toponym_ros::cdr::read(&raw.data).unwrap();
+                sentences.push(text.data);
+            }
+            _ => {}
+        }
+    }
+    let once = ["/map", "/toponym/markers", "/toponym/path"].map(|topic| count[topic]);
+    assert_eq!(once, [1, 1, 1]);
+    assert!(count["/tf"] > 10 && count["/toponym/places"] > 10, "{count:?}");
+    assert!(sentences.iter().any(|s| s.contains("gym")), "{sentences:?}");
+}
+
 /// What of a schema is used here: types, required fields, items, constants.
 fn conforms(value: &Value, schema: &Value, path: &str) {
     let is = match schema["type"].as_str() {
@@ -155,8 +182,16 @@ fn conforms(value: &Value, schema: &Value, path: &str) {
 #[test]
 fn all_forms_are_written_and_are_of_one_map() {
     let exported = Exported::new("all", &[]);
-    let names =
-        ["graph.g2o", "map.json", "map.pgm", "map.schema.json", "map.yaml", "rooms.geojson", "route.geojson"];
+    let names = [
+        "graph.g2o",
+        "map.json",
+        "map.mcap",
+        "map.pgm",
+        "map.schema.json",
+        "map.yaml",
+        "rooms.geojson",
+        "route.geojson",
+    ];
     assert_eq!(exported.names().into_iter().collect::<Vec<_>>(), names);
     let (map, rooms) = (exported.json("map.json"), exported.json("rooms.geojson"));
     conforms(&map, &exported.json("map.schema.json"), "map");

@@ -34,9 +34,12 @@ pub struct ServeArgs {
     /// Folder of the maps, instead of the settings'
     #[arg(long, value_name = "FOLDER")]
     pub data: Option<PathBuf>,
-    /// Tell how the server does at this address: /healthz, and /metrics for Prometheus
+    /// Serve the pages (the map, and one to talk to), /healthz and /metrics at this address [default: 127.0.0.1:7458]
     #[arg(long, value_name = "ADDRESS")]
     pub http: Option<String>,
+    /// Serve no pages
+    #[arg(long, conflicts_with = "http")]
+    pub no_http: bool,
     /// Words and names of your site, one to a line: "refectory = canteen", "name: Room to Grow"
     #[arg(long, value_name = "FILE")]
     pub lexicon: Option<PathBuf>,
@@ -50,6 +53,9 @@ pub struct ServeArgs {
         value_parser = parse_robot
     )]
     pub ros: Vec<RosRobot>,
+    /// Write poses, maps and what is heard as ROS messages, for Foxglove and rerun; one that is there is left alone
+    #[arg(long, value_name = "FILE.mcap")]
+    pub mcap: Option<PathBuf>,
     /// Log what people say, too
     #[arg(long)]
     pub log_speech: bool,
@@ -72,8 +78,9 @@ impl ServeArgs {
         if let Some(data) = &self.data {
             config.data.clone_from(data);
         }
-        config.http = self.http.clone().or(config.http);
+        config.http = self.http.clone().or(config.http).filter(|_| !self.no_http);
         config.lexicon = self.lexicon.clone().or(config.lexicon);
+        config.mcap = self.mcap.clone().or(config.mcap);
         config.ros.extend(self.ros.iter().cloned());
         config.log_speech |= self.log_speech;
         config.check()?;

@@ -8,6 +8,7 @@ use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, AtomicUsize, Ordering}
 use std::sync::mpsc::SyncSender;
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::{Duration, Instant};
+use tokio::sync::broadcast;
 use toponym_core::Snapshot;
 use toponym_journal::Event;
 use toponym_proto::answer::{MapIdentity, Problem, RobotState};
@@ -17,6 +18,10 @@ use super::answered::Answered;
 use super::door::Arrival;
 use super::scribe::Work;
 use crate::fold::Card;
+use crate::web::Published;
+
+/// Events kept for a page that is slow.
+const EVENTS: usize = 1024;
 
 /// Locks; a thread that died while it held the lock left a whole value all the same.
 pub fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
@@ -155,6 +160,8 @@ pub struct Board {
     pub beat_ms: AtomicU64,
     /// When the server began.
     pub began: Instant,
+    /// What is published, for pages; who does not follow misses some.
+    pub events: broadcast::Sender<Arc<Published>>,
     /// Way to the intake, for commands that it carries out; none before it runs.
     pub control: OnceLock<SyncSender<Arrival>>,
 }
@@ -176,6 +183,7 @@ impl Board {
             data: data.into(),
             beat_ms: AtomicU64::new(0),
             began: Instant::now(),
+            events: broadcast::Sender::new(EVENTS),
             control: OnceLock::new(),
         }
     }

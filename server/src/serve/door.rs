@@ -62,21 +62,34 @@ impl Door {
         if sample.kind() != zenoh::sample::SampleKind::Put {
             return;
         }
-        let (key, bytes) = (sample.key_expr().to_string(), sample.payload().len());
+        let (key, encoding) = (sample.key_expr().to_string(), sample.encoding().to_string());
+        self.enter(key, encoding, sample.payload().len(), || sample.payload().to_bytes().into_owned());
+    }
+
+    /// Hands over what came on a key, if there is room for it; `payload` is made only then.
+    pub fn enter(
+        &self,
+        key: String,
+        encoding: String,
+        bytes: usize,
+        payload: impl FnOnce() -> Vec<u8>,
+    ) -> bool {
         let waiting = self.board.queued_bytes.fetch_add(bytes, Ordering::Relaxed);
         if waiting + bytes > self.queue_max_bytes {
-            return self.overrun("queue_bytes", bytes);
+            self.overrun("queue_bytes", bytes);
+            return false;
         }
         let arrival = if bytes > self.payload_max_bytes {
             self.board.reach("payload_bytes");
             Arrival::TooLarge { key, bytes }
         } else {
-            let encoding = sample.encoding().to_string();
-            Arrival::Payload { key, encoding, bytes: sample.payload().to_bytes().into_owned() }
+            Arrival::Payload { key, encoding, bytes: payload() }
         };
-        if self.queue.try_send(arrival).is_err() {
+        let is_in = self.queue.try_send(arrival).is_ok();
+        if !is_in {
             self.overrun("queue_messages", bytes);
         }
+        is_in
     }
 
     /// There is no room: what is dropped was acknowledged to nobody.

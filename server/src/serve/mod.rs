@@ -22,6 +22,7 @@ mod intake;
 mod log;
 mod mapping;
 mod maps;
+mod mcap;
 pub mod network;
 mod outbox;
 pub mod queries;
@@ -29,7 +30,7 @@ mod recording;
 mod robot;
 mod saver;
 pub mod scribe;
-mod watch;
+pub mod watch;
 
 pub use args::{ServeArgs, run};
 pub use log::{LogFormat, init_logging};
@@ -39,6 +40,7 @@ use crate::access::trial::{Op, TrialError, try_rules};
 use crate::access::{Policy, PolicyError, Role};
 use crate::config::{ConfigError, ServerConfig};
 use crate::store::{Store, StoreError};
+use crate::web;
 use board::Board;
 use door::Door;
 use intake::Intake;
@@ -104,6 +106,7 @@ pub struct Server {
     publisher: JoinHandle<()>,
     _token: zenoh::liveliness::LivelinessToken,
     watchers: Vec<tokio::task::JoinHandle<()>>,
+    mcap: Option<mcap::Mcap>,
     endpoints: Vec<String>,
 }
 
@@ -135,14 +138,14 @@ impl Server {
         let board = Arc::new(Board::new(keys.clone(), &config.site, &config.data, config.words()?));
         let records = record.map(Recordings::new).transpose()?;
         let mut watchers = Vec::new();
-        if let Some(address) = &config.http {
-            watchers.push(watch::serve_http(board.clone(), address).await?);
-        }
         let (outbox, publisher) = Outbox::start(board.clone(), session.clone())?;
         let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, records);
         maps.start_saved()?;
         let (door, arrivals) = Door::new(board.clone(), &config);
-        let (limits, robots) = (config.limits.clone(), config.ros.clone());
+        if let Some(address) = &config.http {
+            watchers.push(web::serve(board.clone(), door.clone(), &config, &policy, address).await?);
+        }
+        let (limits, robots, mcap) = (config.limits.clone(), config.ros.clone(), config.mcap.clone());
         let intake = Intake::new(config, board.clone(), outbox.clone(), maps);
         let intake =
             std::thread::Builder::new().name("intake".into()).spawn(move || intake.run(&arrivals))?;
@@ -154,8 +157,22 @@ impl Server {
             let site = board.site.clone();
             watchers.push(tokio::spawn(toponym_ros::live::run(robot, site, session.clone())));
         }
-        let server =
-            Self { session, board, door, intake, outbox, publisher, _token: token, watchers, endpoints };
+        let mcap = match mcap {
+            Some(file) => Some(mcap::Mcap::begin(&file, &session, board.clone()).await?),
+            None => None,
+        };
+        let server = Self {
+            session,
+            board,
+            door,
+            intake,
+            outbox,
+            publisher,
+            _token: token,
+            watchers,
+            mcap,
+            endpoints,
+        };
         info!(site = server.board.site, endpoints = server.endpoints.join(" "), "listening");
         Ok(server)
     }
@@ -173,7 +190,7 @@ impl Server {
     /// Takes in what has arrived, saves all maps, closes the network. A map that could not be saved
     /// is an error, told when all is closed.
     pub async fn stop(self) -> Result<(), ServeError> {
-        let Self { session, door, intake, outbox, publisher, watchers, .. } = self;
+        let Self { session, door, intake, outbox, publisher, watchers, mcap, .. } = self;
         for watcher in &watchers {
             watcher.abort();
         }
@@ -185,6 +202,9 @@ impl Server {
             intake.and_then(|failed| publisher.map(|()| failed))
         });
         let joined = done.await.map_err(std::io::Error::other)?;
+        if let Some(mcap) = mcap {
+            mcap.end().await;
+        }
         session.close().await?;
         let failed =
             joined.map_err(|_| std::io::Error::other("a thread of the server failed: see the log"))?;

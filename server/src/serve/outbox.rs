@@ -12,6 +12,7 @@ use zenoh::{Session, Wait};
 
 use super::board::{Board, MapView, lock};
 use super::queries;
+use crate::web::Published;
 
 /// Queue length: seconds of poses of a few robots.
 const QUEUE: usize = 1024;
@@ -86,12 +87,39 @@ fn written<T: Serialize>(key: &str, value: &T) -> Option<Vec<u8>> {
     serde_json::to_vec(value).inspect_err(|e| error!(key, "can't be written as JSON: {e}")).ok()
 }
 
+/// Pages get the same, but of a map that has changed only that it has.
+fn tell_pages(board: &Board, key: &str, json: &[u8]) {
+    let chunks = board.keys.chunks(key).unwrap_or_default();
+    let [_, of, "out", what] = chunks[..] else { return };
+    let name = match what {
+        "pose" => "pose",
+        "heard" => "heard",
+        "state" => "state",
+        "jump" => "jump",
+        "graph" => "map",
+        _ => return,
+    };
+    // Nobody looking is no error.
+    let _ = board.events.send(Arc::new(Published { name, json: json.to_vec(), of: of.to_owned() }));
+}
+
 fn publish_all(board: &Board, session: &Session, parcels: &Receiver<Parcel>) {
     while let Ok(parcel) = parcels.recv() {
         let (key, json, prompt) = match parcel {
-            Parcel::Payload { key, json, prompt } => (key, json, prompt),
+            Parcel::Payload { key, json, prompt } => {
+                tell_pages(board, &key, &json);
+                (key, json, prompt)
+            }
             Parcel::Graph(map) => match queries::graph(&map) {
-                Ok(json) => (board.keys.graph(&map.id), json, false),
+                Ok(json) => {
+                    let identity = map.identity(&map.snapshot.load());
+                    tell_pages(
+                        board,
+                        &board.keys.graph(&map.id),
+                        &serde_json::to_vec(&identity).unwrap_or_default(),
+                    );
+                    (board.keys.graph(&map.id), json, false)
+                }
                 Err(problem) => {
                     error!(map = map.id, "graph: {problem}");
                     continue;

@@ -13,9 +13,7 @@ use sd_notify::NotifyState;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
-use tokio::net::TcpListener;
 use toponym_proto::answer::{ANSWER_VERSION, Info, Machine, MapWork};
-use tracing::{error, info};
 
 use super::board::{Board, MapView, lock};
 
@@ -151,12 +149,8 @@ fn gauges(registry: &mut Registry, name: &str, help: &str, values: Vec<(Labels, 
     registry.register(name, help, family);
 }
 
-/// `/healthz` and `/metrics` on an address such as `127.0.0.1:7458`, until the task is aborted.
-pub async fn serve_http(board: Arc<Board>, address: &str) -> std::io::Result<tokio::task::JoinHandle<()>> {
-    let listener = TcpListener::bind(address)
-        .await
-        .map_err(|e| std::io::Error::new(e.kind(), format!("cannot listen on http {address}: {e}")))?;
-    info!(address = %listener.local_addr()?, "http: /healthz /metrics");
+/// `/healthz` and `/metrics`: everybody who reaches them may read them.
+pub fn routes(board: Arc<Board>) -> Router {
     let healthy = board.clone();
     let healthz = move || async move {
         match health(&healthy) {
@@ -173,12 +167,7 @@ pub async fn serve_http(board: Arc<Board>, address: &str) -> std::io::Result<tok
             Err(e) => (StatusCode::INTERNAL_SERVER_ERROR, e.to_string()).into_response(),
         }
     };
-    let router = Router::new().route("/healthz", get(healthz)).route("/metrics", get(metrics));
-    Ok(tokio::spawn(async move {
-        if let Err(e) = axum::serve(listener, router).await {
-            error!("http: {e}");
-        }
-    }))
+    Router::new().route("/healthz", get(healthz)).route("/metrics", get(metrics))
 }
 
 /// Tells systemd that the server is ready, and then, as often as it wants to know, that it lives: as long as it does.

@@ -1,0 +1,62 @@
+//! What happens, as it happens: server-sent events.
+
+use super::Web;
+use super::guard::Who;
+use axum::Extension;
+use axum::extract::State;
+use axum::response::sse::{Event as Sent, KeepAlive, Sse};
+use futures_util::stream::{Stream, unfold};
+use std::collections::BTreeMap;
+use std::convert::Infallible;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use tokio::sync::broadcast::Receiver;
+use tokio::sync::broadcast::error::RecvError;
+
+/// A page shows a robot's pose so often: those between are left out.
+const POSE_PERIOD: Duration = Duration::from_millis(500);
+
+/// Something that happened.
+#[derive(Debug)]
+pub struct Published {
+    /// `pose`, `heard`, `state`, `jump`, or `map` for one that has changed.
+    pub name: &'static str,
+    /// As in PROTOCOL.md; of `map` its identity.
+    pub json: Vec<u8>,
+    /// Of which robot or map.
+    pub of: String,
+}
+
+/// Events from now on. A page that does not read misses some, and slows nobody down.
+pub async fn events(
+    State(web): State<Arc<Web>>,
+    Extension(who): Extension<Who>,
+) -> Sse<impl Stream<Item = Result<Sent, Infallible>>> {
+    let may_hear = who.may_hear();
+    let begin = (web.board.events.subscribe(), BTreeMap::<String, Instant>::new());
+    let next = move |(mut events, mut shown): (Receiver<Arc<Published>>, BTreeMap<String, Instant>)| async move {
+        loop {
+            let event = match events.recv().await {
+                Ok(event) => event,
+                Err(RecvError::Lagged(missed)) => {
+                    let told = Sent::default().event("missed").data(missed.to_string());
+                    return Some((Ok(told), (events, shown)));
+                }
+                Err(RecvError::Closed) => return None,
+            };
+            if event.name == "heard" && !may_hear {
+                continue;
+            }
+            if event.name == "pose" {
+                let now = Instant::now();
+                if shown.get(&event.of).is_some_and(|last| now - *last < POSE_PERIOD) {
+                    continue;
+                }
+                shown.insert(event.of.clone(), now);
+            }
+            let json = String::from_utf8_lossy(&event.json);
+            return Some((Ok(Sent::default().event(event.name).data(json)), (events, shown)));
+        }
+    };
+    Sse::new(unfold(begin, next)).keep_alive(KeepAlive::default())
+}

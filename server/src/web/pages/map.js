@@ -1,0 +1,297 @@
+// The map, its rooms, and questions to it.
+
+import { ask, command, element, listen } from "./api.js";
+import { Drawing } from "./drawing.js";
+
+/** A map that changes all the time is fetched no more often. */
+const REFRESH_MS = 3000;
+
+const at = (id) => document.getElementById(id);
+const drawing = new Drawing(at("canvas"));
+let map = null;
+let shown = false;
+let following = true;
+let due = null;
+let refreshing = false;
+let sentences = new Map();
+
+const percent = (p) => `${Math.round(100 * p)} %`;
+
+async function tile(x, y, hash) {
+  const response = await fetch(`/map/${map}/tile/${x}/${y}?hash=${hash}`);
+  if (!response.ok) throw new Error(response.statusText);
+  return createImageBitmap(await response.blob());
+}
+
+async function refresh() {
+  if (refreshing || !map) return;
+  refreshing = true;
+  try {
+    const [tiles, { regions }, graph] = await Promise.all(
+      [ask(`/map/${map}/tiles`), ask(`/map/${map}/ask/regions`), ask(`/map/${map}/ask/graph`)]);
+    drawing.graph = graph;
+    drawing.setRegions(regions);
+    list(regions);
+    tellDoubt(graph);
+    await drawing.take(tiles, tile);
+    at("empty").hidden = tiles.tiles.length > 0;
+    if (!shown && tiles.tiles.length) {
+      shown = true;
+      drawing.fit();
+    }
+  } catch (error) {
+    at("connection").textContent = error.message;
+  } finally {
+    refreshing = false;
+  }
+}
+
+/** The map has changed: it is fetched soon, and not too often. */
+function changed() {
+  due ??= setTimeout(() => {
+    due = null;
+    refresh();
+  }, shown ? REFRESH_MS : 100);
+}
+
+function robotAt() {
+  for (const pose of drawing.robots.values()) return [pose.map_from_body.x_m, pose.map_from_body.y_m];
+  return null;
+}
+
+function list(regions) {
+  const from = robotAt();
+  const distance = (r) => from && Math.hypot(r.middle[0] - from[0], r.middle[1] - from[1]);
+  const rooms = drawing.regions.map((r) => ({ r, far: distance(r) })).filter(({ r }) => r.names.length || regions.length < 40);
+  rooms.sort((a, b) => (b.r.names[0]?.p ?? 0) - (a.r.names[0]?.p ?? 0));
+  at("rooms").replaceChildren(...rooms.map(({ r, far }) => {
+    const name = r.names[0];
+    const text = name ? `${name.label}, ${percent(name.p)}` : `${r.kind} without a name`;
+    const where = `${r.area_m2.toFixed(0)} m²${far === null ? "" : `, ${far.toFixed(0)} m away`}`;
+    const swatch = element("span", { class: `swatch c${r.id % 8}`, "aria-hidden": "true" });
+    return element("li", {}, element("button", { type: "button", onclick: () => choose(r, true) }, swatch,
+      element("span", {}, text), element("small", {}, where)));
+  }));
+}
+
+function tellDoubt({ differences, unresolved }) {
+  const lines = differences.map((d) => element("li", {}, `${percent(d.weight)}: ${d.words}`));
+  const rest = unresolved > 0.005 ? element("p", {}, `None of those kept: ${percent(unresolved)}`) : undefined;
+  at("doubt").hidden = !drawing.doubt || !(lines.length || rest);
+  at("doubt").replaceChildren(element("h2", {}, "This map can be so"), element("ul", {}, ...lines), ...(rest ? [rest] : []));
+}
+
+async function readSentences() {
+  try {
+    const reply = await ask(`/map/${map}/sentences`);
+    sentences = new Map(reply.sentences.map((s) => [s.id, s]));
+  } catch {
+    // Whoever may look may not always read what was said.
+    sentences = new Map();
+  }
+}
+
+async function because(name) {
+  const { candidates } = await ask(`/map/${map}/ask/where`, { name });
+  return (id) => candidates.find((c) => c.region === id)?.because ?? [];
+}
+
+/** A room: what it may be called, why, and how to mend that. */
+async function choose(region, fly) {
+  drawing.chosen = region.id;
+  drawing.found = [];
+  if (fly) {
+    setFollowing(false);
+    drawing.fly(region.middle, Math.max(8, Math.sqrt(region.area_m2)));
+  }
+  drawing.draw();
+  const room = at("room");
+  room.hidden = false;
+  const title = region.names[0]?.label ?? `A ${region.kind} without a name`;
+  const doors = `${region.kind}, ${region.area_m2.toFixed(1)} m², ${region.doorways.length} doorways`;
+  room.replaceChildren(element("h2", {}, title), element("p", {}, doors));
+  await readSentences();
+  for (const name of region.names) {
+    const behind = element("ul", { class: "because" });
+    const actions = element("p", {},
+      element("button", { type: "button", onclick: () => rename(name.label, actions) }, "Rename"),
+      element("button", { type: "button", onclick: () => mend("forget", { name: name.label }) }, "Forget"));
+    room.append(element("h3", {}, `${name.label}: ${percent(name.p)}`), behind, actions);
+    const ids = (await because(name.label))(region.id);
+    behind.replaceChildren(...ids.map((id) => {
+      const text = sentences.get(id)?.text ?? "a sentence";
+      return element("li", {}, `“${text}” `, element("button", { type: "button", onclick: () => mend("undo", { id }) }, "Undo"));
+    }));
+  }
+}
+
+function rename(from, after) {
+  const input = element("input", { type: "text", "aria-label": `Instead of ${from}`, maxlength: 100 });
+  const form = element("form", {
+    onsubmit: (event) => {
+      event.preventDefault();
+      if (input.value.trim()) mend("rename", { from, to: input.value.trim() });
+    },
+  }, input, element("button", { type: "submit" }, "Rename"));
+  after.replaceChildren(form);
+  input.focus();
+}
+
+async function mend(what, parameters) {
+  let words;
+  try {
+    ({ words } = await command(what, { ...parameters, map }));
+  } catch (error) {
+    words = error.message;
+  }
+  at("room").replaceChildren(element("p", {}, words));
+  await refresh();
+}
+
+function bearing(rad) {
+  const degrees = Math.round((rad * 180) / Math.PI);
+  if (Math.abs(degrees) < 15) return "ahead";
+  if (Math.abs(degrees) > 165) return "behind";
+  return `${Math.abs(degrees)}° ${degrees > 0 ? "left" : "right"}`;
+}
+
+async function question(text) {
+  const answer = at("answer");
+  answer.hidden = false;
+  at("room").hidden = true;
+  drawing.chosen = null;
+  let reply;
+  try {
+    reply = await ask(`/map/${map}/ask/where`, { text });
+  } catch (error) {
+    drawing.found = [];
+    answer.replaceChildren(element("p", {}, `${error.message}${error.problem?.hint ? `: ${error.problem.hint}` : ""}`));
+    return;
+  }
+  const likely = reply.candidates.filter((c) => c.probability >= 0.02);
+  drawing.found = likely;
+  const lines = likely.map((c) => {
+    const from = c.from_robot ? `, ${c.from_robot.distance_m.toFixed(0)} m ${bearing(c.from_robot.bearing_rad)}` : "";
+    const go = () => drawing.fly([c.x_m, c.y_m], 8);
+    return element("li", {}, element("button", { type: "button", onclick: go },
+      element("strong", {}, c.shown || c.label), ` ${percent(c.probability)}${from}`));
+  });
+  if (reply.p_none >= 0.01) lines.push(element("li", { class: "none" }, `Not in this map, as far as it is known: ${percent(reply.p_none)}`));
+  const { via, label, suggestions } = reply.resolved;
+  const how = via === "exact" || !label ? undefined : element("p", {}, `understood as ${label} (${via})`);
+  const offers = suggestions.length ? element("p", {}, `Did you mean ${suggestions.join(" or ")}?`) : undefined;
+  answer.replaceChildren(element("h2", {}, text), ...[how, element("ul", {}, ...lines), offers].filter(Boolean));
+  if (likely.length) {
+    setFollowing(false);
+    drawing.fly([likely[0].x_m, likely[0].y_m], 10);
+  } else drawing.draw();
+}
+
+function setFollowing(is) {
+  following = is;
+  at("follow").setAttribute("aria-pressed", is);
+}
+
+function pointers() {
+  const canvas = at("canvas");
+  const down = new Map();
+  let moved = 0;
+  canvas.addEventListener("pointerdown", (event) => {
+    canvas.setPointerCapture(event.pointerId);
+    down.set(event.pointerId, [event.offsetX, event.offsetY]);
+    if (down.size === 1) moved = 0;
+  });
+  canvas.addEventListener("pointermove", (event) => {
+    const before = down.get(event.pointerId);
+    if (!before) return;
+    const now = [event.offsetX, event.offsetY];
+    const other = [...down].find(([id]) => id !== event.pointerId)?.[1];
+    moved += Math.hypot(now[0] - before[0], now[1] - before[1]);
+    if (other) {
+      const spread = (p) => Math.hypot(p[0] - other[0], p[1] - other[1]) || 1;
+      drawing.zoom(spread(now) / spread(before), (now[0] + other[0]) / 2, (now[1] + other[1]) / 2);
+    } else if (moved > 4) {
+      setFollowing(false);
+      drawing.pan(now[0] - before[0], now[1] - before[1]);
+    }
+    down.set(event.pointerId, now);
+  });
+  const up = (event) => {
+    if (down.delete(event.pointerId) && moved <= 4 && !down.size) {
+      const region = drawing.regionAt(drawing.toMap(event.offsetX, event.offsetY));
+      if (region) choose(region, false);
+    }
+  };
+  canvas.addEventListener("pointerup", up);
+  canvas.addEventListener("pointercancel", (event) => down.delete(event.pointerId));
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    drawing.zoom(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY);
+  }, { passive: false });
+  canvas.addEventListener("keydown", (event) => {
+    const moves = { ArrowLeft: [60, 0], ArrowRight: [-60, 0], ArrowUp: [0, 60], ArrowDown: [0, -60] };
+    if (moves[event.key]) {
+      setFollowing(false);
+      drawing.pan(...moves[event.key]);
+    } else if ("+=".includes(event.key)) drawing.zoom(1.3);
+    else if (event.key === "-") drawing.zoom(1 / 1.3);
+    else if (event.key === "0") drawing.fit();
+    else return;
+    event.preventDefault();
+  });
+}
+
+async function findMaps() {
+  const info = await ask("/info");
+  const wanted = map ?? new URLSearchParams(location.search).get("map") ?? info.maps[0]?.id;
+  at("map").replaceChildren(...info.maps.map(({ id }) => element("option", { value: id, selected: id === wanted }, id)));
+  if (!info.maps.length) at("empty").hidden = false;
+  if (wanted && wanted !== map) open(wanted);
+}
+
+function open(id) {
+  map = id;
+  shown = false;
+  drawing.tiles.clear();
+  drawing.robots.clear();
+  drawing.found = [];
+  refresh();
+}
+
+listen({
+  pose: (pose) => {
+    if (pose.map.id !== map) return map ? undefined : findMaps();
+    drawing.robots.set(pose.robot, pose);
+    const { x_m, y_m } = pose.map_from_body;
+    if (following && shown) {
+      // Only when it nears the edge: a picture that never stands still is hard to read.
+      const box = at("canvas").getBoundingClientRect();
+      const [x, y] = drawing.toScreen([x_m, y_m]).map((k) => k / drawing.ratio);
+      if (x < 60 || y < 60 || x > box.width - 60 || y > box.height - 60) drawing.fly([x_m, y_m]);
+    }
+    drawing.draw();
+  },
+  map: (identity) => identity.id === map ? changed() : findMaps(),
+  jump: changed,
+  missed: changed,
+}, (is) => {
+  at("connection").textContent = is ? "" : "no connection";
+  at("connection").className = is ? "good" : "bad";
+  if (is) findMaps().then(changed).catch(() => {});
+});
+at("map").addEventListener("change", () => open(at("map").value));
+at("asked").addEventListener("submit", (event) => {
+  event.preventDefault();
+  const text = at("name").value.trim();
+  if (text && map) question(text);
+});
+at("all").addEventListener("click", () => drawing.fit());
+at("follow").addEventListener("click", () => setFollowing(!following));
+at("more").addEventListener("click", () => {
+  drawing.doubt = !drawing.doubt;
+  at("more").setAttribute("aria-pressed", drawing.doubt);
+  if (drawing.graph) tellDoubt(drawing.graph);
+  drawing.draw();
+});
+pointers();
+navigator.serviceWorker?.register("/sw.js").catch(() => {});

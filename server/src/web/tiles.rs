@@ -1,0 +1,191 @@
+//! A map's grid in tiles: a page asks which there are and fetches those that it does not have yet.
+
+use super::Web;
+use super::api::refuse;
+use crate::serve::board::{MapView, lock};
+use axum::Json;
+use axum::extract::{Path, Query, State};
+use axum::http::{StatusCode, header};
+use axum::response::{IntoResponse, Response};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::sync::{Arc, Mutex};
+use toponym_core::Snapshot;
+use toponym_core::answers::query::Grid;
+use toponym_proto::answer::{ANSWER_VERSION, ErrorCode, MapIdentity, Problem};
+use toponym_proto::grid::png_of;
+
+/// Edge of a tile, cells.
+const TILE: i64 = 128;
+/// Edge of a cell, metres.
+const RESOLUTION_M: f64 = 0.1;
+
+/// The newest tiles of each map.
+#[derive(Default)]
+pub struct Tiles {
+    of: Mutex<BTreeMap<String, Arc<Tiled>>>,
+}
+
+/// The tiles of one state of a map.
+struct Tiled {
+    map: MapIdentity,
+    resolution_m: f64,
+    /// By column and row, from the map's origin on.
+    tiles: BTreeMap<(i64, i64), Tile>,
+}
+
+struct Tile {
+    /// Of its pixels: the same pixels have the same.
+    hash: String,
+    png: Vec<u8>,
+}
+
+/// Answer of `/map/{map}/tiles`.
+#[derive(Serialize)]
+struct TilesReply {
+    v: u32,
+    map: MapIdentity,
+    resolution_m: f64,
+    /// Cells in a row, and in a column, of a tile.
+    tile_cells: i64,
+    tiles: Vec<TileEntry>,
+}
+
+#[derive(Serialize)]
+struct TileEntry {
+    /// Its lower left corner is at x · cells · resolution, in the map.
+    x: i64,
+    y: i64,
+    hash: String,
+}
+
+impl Tiles {
+    /// The tiles of a map as it is now: made once for each state of it, however many look.
+    fn of(&self, view: &MapView) -> Arc<Tiled> {
+        let snapshot = view.snapshot.load_full();
+        let map = view.identity(&snapshot);
+        if let Some(known) = lock(&self.of).get(&view.id).filter(|tiled| tiled.map == map) {
+            return known.clone();
+        }
+        let tiled = Arc::new(Tiled::new(map, &snapshot));
+        lock(&self.of).insert(view.id.clone(), tiled.clone());
+        tiled
+    }
+}
+
+impl Tiled {
+    fn new(map: MapIdentity, snapshot: &Snapshot) -> Self {
+        let grid = snapshot.grid(RESOLUTION_M);
+        Self { map, resolution_m: grid.resolution_m, tiles: tiles(&grid) }
+    }
+}
+
+/// Cuts a grid along lines that stay where they are when it grows. Tiles of which nothing is known are left out.
+fn tiles(grid: &Grid) -> BTreeMap<(i64, i64), Tile> {
+    let cell = |m: f64| (m / grid.resolution_m).round() as i64;
+    let (left, low) = (cell(grid.map_from_grid.x_m), cell(grid.map_from_grid.y_m));
+    let mut cells: BTreeMap<(i64, i64), Vec<i8>> = BTreeMap::new();
+    for (k, &value) in grid.cells.iter().enumerate().filter(|(_, value)| **value >= 0) {
+        let (x, y) = (left + (k % grid.width) as i64, low + (k / grid.width) as i64);
+        let tile = cells.entry((x.div_euclid(TILE), y.div_euclid(TILE)));
+        let tile = tile.or_insert_with(|| vec![-1; (TILE * TILE) as usize]);
+        tile[(y.rem_euclid(TILE) * TILE + x.rem_euclid(TILE)) as usize] = value;
+    }
+    let drawn = cells.into_iter().filter_map(|(at, cells)| {
+        let bytes: Vec<u8> = cells.iter().map(|cell| cell.cast_unsigned()).collect();
+        let png = png_of(TILE as usize, TILE as usize, &cells).ok()?;
+        Some((at, Tile { hash: format!("{:08x}{:04x}", crc32fast::hash(&bytes), png.len() & 0xffff), png }))
+    });
+    drawn.collect()
+}
+
+fn map(web: &Web, id: &str) -> Result<Arc<MapView>, Box<Response>> {
+    let no = || Problem::new(ErrorCode::NoSuchMap, format!("there is no map {id:?}")).field("map");
+    web.board.maps.load().get(id).cloned().ok_or_else(|| Box::new(refuse(StatusCode::NOT_FOUND, no())))
+}
+
+async fn tiled(web: Arc<Web>, id: &str) -> Result<Arc<Tiled>, Box<Response>> {
+    let view = map(&web, id)?;
+    let made = tokio::task::spawn_blocking(move || web.tiles.of(&view)).await;
+    made.map_err(|e| {
+        let problem = Problem::new(ErrorCode::Internal, e.to_string());
+        Box::new(refuse(StatusCode::INTERNAL_SERVER_ERROR, problem))
+    })
+}
+
+/// Which tiles there are.
+pub async fn list(State(web): State<Arc<Web>>, Path(id): Path<String>) -> Response {
+    match tiled(web, &id).await {
+        Ok(tiled) => {
+            let entry = |(&(x, y), tile): (&(i64, i64), &Tile)| TileEntry { x, y, hash: tile.hash.clone() };
+            let reply = TilesReply {
+                v: ANSWER_VERSION,
+                map: tiled.map.clone(),
+                resolution_m: tiled.resolution_m,
+                tile_cells: TILE,
+                tiles: tiled.tiles.iter().map(entry).collect(),
+            };
+            ([(header::CACHE_CONTROL, "no-store")], Json(reply)).into_response()
+        }
+        Err(refused) => *refused,
+    }
+}
+
+/// Which state of a tile.
+#[derive(Deserialize)]
+pub struct Which {
+    hash: Option<String>,
+}
+
+/// One tile, as it is now: an indexed PNG, as `ask/grid` has it.
+pub async fn tile(
+    State(web): State<Arc<Web>>,
+    Path((id, x, y)): Path<(String, i64, i64)>,
+    Query(which): Query<Which>,
+) -> Response {
+    let tiled = match tiled(web, &id).await {
+        Ok(tiled) => tiled,
+        Err(refused) => return *refused,
+    };
+    let Some(tile) = tiled.tiles.get(&(x, y)) else {
+        let problem = Problem::new(ErrorCode::NoSuchQuery, "nothing is known there").field("tile");
+        return refuse(StatusCode::NOT_FOUND, problem);
+    };
+    // Whoever asked for this state of it need never ask again.
+    let keep = if which.hash.as_ref() == Some(&tile.hash) {
+        "private, max-age=86400, immutable"
+    } else {
+        "no-store"
+    };
+    ([(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, keep)], tile.png.clone()).into_response()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use toponym_core::Pose2;
+
+    fn grid(left: i64, low: i64, cells: Vec<i8>, width: usize) -> Grid {
+        let height = cells.len() / width;
+        let map_from_grid = Pose2::new(left as f64 * 0.1, low as f64 * 0.1, 0.0);
+        Grid { resolution_m: 0.1, width, height, map_from_grid, cells }
+    }
+
+    #[test]
+    fn tiles_stay_where_they_are_when_the_map_grows() {
+        let small = tiles(&grid(-1, 2, vec![100, 0, 0, 100], 2));
+        assert_eq!(small.keys().collect::<Vec<_>>(), [&(-1, 0), &(0, 0)]);
+        // Grown by a column to the left, unknown, and one of the right beyond the second tile.
+        let mut cells = vec![-1; 2 * 400];
+        for (k, value) in [(1, 100), (2, 0), (401, 0), (402, 100), (399, 0)] {
+            cells[k] = value;
+        }
+        let grown = tiles(&grid(-2, 2, cells, 400));
+        assert_eq!(grown.len(), 3);
+        assert!(
+            [(-1, 0), (0, 0)]
+                .iter()
+                .all(|at| grown[at].hash == small[at].hash && grown[at].png == small[at].png)
+        );
+    }
+}
