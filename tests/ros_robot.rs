@@ -211,6 +211,12 @@ impl Transforms {
         Some([a[0] + share * (b[0] - a[0]), a[1] + share * (b[1] - a[1]), a[2] + share * turn])
     }
 
+    /// x, y and yaw of a child in its parent as told last.
+    pub fn newest(&self, parent: &str, child: &str) -> Option<[f64; 3]> {
+        let known = self.known.lock().unwrap_or_else(PoisonError::into_inner);
+        known.tracks.get(&(name(parent), name(child)))?.back().map(|(_, pose)| *pose)
+    }
+
     /// Times between arrivals of transforms from `map`, seconds.
     pub fn periods_s(&self) -> Vec<f64> {
         self.known.lock().unwrap_or_else(PoisonError::into_inner).periods_s.clone()

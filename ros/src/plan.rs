@@ -9,6 +9,8 @@ use toponym_proto::{Laser, Pose};
 
 /// Farthest that a laser is believed to see that tells nothing of it, metres.
 const RANGE_MAX_M: f64 = 30.0;
+/// No laser sees so far: a driver that says so says nothing, metres.
+const RANGE_LIMIT_M: f64 = 1000.0;
 /// Closer returns are dust on the window, metres.
 const RANGE_MIN_M: f64 = 0.02;
 /// Parts of names of topics on which texts are what people say.
@@ -290,7 +292,7 @@ impl Survey {
             pose.map(|pose| mounting(&pose)).transpose().map_err(|why| format!("{topic}: {why}"))?;
         let body_from_laser = mounting.map_or(Pose::default(), |m| m.body_from_laser);
         let range_min_m = if seen.range_min_m > 0.0 { seen.range_min_m } else { RANGE_MIN_M };
-        let tells_range = seen.range_max_m.is_finite() && seen.range_max_m > range_min_m;
+        let tells_range = seen.range_max_m <= RANGE_LIMIT_M && seen.range_max_m > range_min_m;
         if !tells_range {
             remarks.push(format!(
                 "{topic} has a range_max of {}: {RANGE_MAX_M} m is taken; set it in the laser's driver",
@@ -323,7 +325,8 @@ impl Survey {
     }
 }
 
-fn is_speech(topic: &str, wanted: &[String]) -> bool {
+/// Whether texts on a topic are what people say.
+pub fn is_speech(topic: &str, wanted: &[String]) -> bool {
     let last = topic.rsplit('/').next().unwrap_or_default().to_lowercase();
     if wanted.is_empty() {
         SPEECH.iter().any(|word| last.contains(word))

@@ -34,8 +34,11 @@ fn again<T: serde::Serialize + serde::de::DeserializeOwned>(bytes: &[u8]) -> Vec
     cdr::write(&cdr::read::<T>(bytes).unwrap()).unwrap()
 }
 
-/// Reads and writes a type that is used.
-fn writer(kind: &str) -> Option<fn(&[u8]) -> Vec<u8>> {
+/// Reads and writes.
+type Again = fn(&[u8]) -> Vec<u8>;
+
+/// That for a type that is used.
+fn writer(kind: &str) -> Option<Again> {
     Some(match kind {
         kind::SCAN => again::<LaserScan>,
         kind::ODOMETRY => again::<Odometry>,

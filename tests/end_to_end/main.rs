@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "a test says by a panic that it has failed")]
 
 mod lifetime;
+mod pages;
 mod questions;
 mod roles;
 mod ros;

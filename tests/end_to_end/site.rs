@@ -42,6 +42,7 @@ impl Drop for Folder {
 pub fn settings(folder: &Folder) -> ServerConfig {
     let mut config = ServerConfig {
         listen: vec!["tcp/127.0.0.1:0".into()],
+        http: None,
         data: folder.0.join("data"),
         hold_back_s: 0.05,
         gap_wait_s: 0.3,

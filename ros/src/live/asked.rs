@@ -65,11 +65,16 @@ pub async fn answer_all(shared: &Arc<Shared>, ros: &Session, speaker: &Speaker) 
     }
     let (last, is) = (desk.clone(), desk);
     let answer = move |asked: Asked| {
-        last.clone().work(move |desk| async move { asked.answer(&desk.last().await).await });
+        let asked = Arc::new(asked);
+        let busy = TriggerResponse { success: false, message: BUSY.into() };
+        last.clone()
+            .work_or(asked.clone(), busy, move |desk| async move { asked.answer(&desk.last().await).await });
     };
     speaker.service(&speaker.named("/toponym/where"), kind::TRIGGER, answer).await?;
     let answer = move |asked: Asked| {
-        is.clone().work(move |desk| async move {
+        let asked = Arc::new(asked);
+        let busy = WhereResponse { message: BUSY.into(), p_none: 1.0, ..WhereResponse::default() };
+        is.clone().work_or(asked.clone(), busy, move |desk| async move {
             let response = match asked.request::<WhereRequest>() {
                 Ok(request) => desk.where_is(&request).await,
                 Err(message) => WhereResponse { message, ..WhereResponse::default() },
@@ -82,15 +87,14 @@ pub async fn answer_all(shared: &Arc<Shared>, ros: &Session, speaker: &Speaker) 
 }
 
 impl Desk {
-    /// Answers beside what else is asked, unless that is too much.
-    fn work<F>(self: Arc<Self>, answer: impl FnOnce(Arc<Self>) -> F)
+    /// Answers beside what else is asked, unless that is too much: then false.
+    fn work<F>(self: Arc<Self>, answer: impl FnOnce(Arc<Self>) -> F) -> bool
     where
         F: Future<Output = Result<(), String>> + Send + 'static,
     {
         let Ok(permit) = self.permits.clone().try_acquire_owned() else {
-            // Whoever asked by a service gets no answer then, and asks again.
             warn!(robot = self.shared.robot.robot, "{BUSY}");
-            return;
+            return false;
         };
         let (runtime, answer) = (self.runtime.clone(), answer(self));
         runtime.spawn(async move {
@@ -99,6 +103,19 @@ impl Desk {
             }
             drop(permit);
         });
+        true
+    }
+
+    /// The same for a service: one that is not answered waits for ever.
+    fn work_or<F, T>(self: Arc<Self>, asked: Arc<Asked>, busy: T, answer: impl FnOnce(Arc<Self>) -> F)
+    where
+        F: Future<Output = Result<(), String>> + Send + 'static,
+        T: serde::Serialize + Send + Sync + 'static,
+    {
+        let runtime = self.runtime.clone();
+        if !self.work(answer) {
+            runtime.spawn(async move { asked.answer(&busy).await });
+        }
     }
 
     async fn ask(&self, name: &str) -> Result<WhereReply, ClientError> {

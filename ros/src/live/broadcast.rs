@@ -28,8 +28,9 @@ pub async fn broadcast(shared: Arc<Shared>, speaker: Arc<Speaker>) -> Result<(),
     let why = |e: zenoh::Error| e.to_string();
     let mut plan = shared.plan.subscribe();
     plan.wait_for(Option::is_some).await.map_err(|e| e.to_string())?;
-    let topic = shared.tf_topic.borrow().clone();
-    let transforms = speaker.topic(&topic, kind::TF, Qos::Reliable(100)).await.map_err(why)?;
+    let mut topic = shared.tf_topic.subscribe();
+    let name = topic.borrow_and_update().clone();
+    let mut transforms = speaker.topic(&name, kind::TF, Qos::Reliable(100)).await.map_err(why)?;
     let named = speaker.named("/toponym/pose");
     let poses = speaker.topic(&named, kind::POSE_WITH_COVARIANCE, Qos::Reliable(10)).await.map_err(why)?;
     let mut ticks = tokio::time::interval(Duration::from_secs_f64(shared.robot.transform_publish_period_s));
@@ -51,6 +52,11 @@ pub async fn broadcast(shared: Arc<Shared>, speaker: Arc<Speaker>) -> Result<(),
                 newest_ns = if newest_ns - stamp_ns < OTHERS_NS { newest_ns.max(stamp_ns) } else { stamp_ns };
                 let Some(message) = map_from_odom(&shared, newest_ns) else { continue };
                 transforms.write(&message).await?;
+            }
+            changed = topic.changed() => {
+                changed.map_err(|e| e.to_string())?;
+                let name = topic.borrow_and_update().clone();
+                transforms = speaker.topic(&name, kind::TF, Qos::Reliable(100)).await.map_err(why)?;
             }
             changed = pose.changed() => {
                 changed.map_err(|e| e.to_string())?;

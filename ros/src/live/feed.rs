@@ -13,6 +13,8 @@ const LOOK_NS: i64 = 300_000_000;
 const LOOK_MAX_NS: i64 = 8_000_000_000;
 /// Kept until it is known what they are, bytes.
 const KEPT_MAX_BYTES: usize = 64 << 20;
+/// What a message takes beside its content, about.
+const ENTRY_BYTES: usize = 200;
 /// So many messages in a row from before the newest, and the robot's clock began anew.
 const BACK_MAX: u32 = 20;
 
@@ -77,12 +79,12 @@ impl Feed {
             return self.stream_on(topic, received_ns, &data, out);
         }
         self.survey.take(topic, &data)?;
-        self.kept_bytes += data.len();
+        self.kept_bytes += data.len() + ENTRY_BYTES;
         self.kept.push_back((topic.clone(), received_ns, data));
         while self.kept_bytes > KEPT_MAX_BYTES
             && let Some((.., oldest)) = self.kept.pop_front()
         {
-            self.kept_bytes -= oldest.len();
+            self.kept_bytes -= oldest.len() + ENTRY_BYTES;
         }
         // Not from when nothing but the floor plan of its frames was there.
         if topic.kind != kind::SCAN && self.first_ns.is_none() {
@@ -213,7 +215,9 @@ mod tests {
             for k in 0..30 {
                 let ns = from_ns + k * TENTH_NS;
                 self.transform("/tf", ns, "odom", "base");
-                lasers.iter().for_each(|topic| self.scan(topic, ns));
+                for topic in lasers {
+                    self.scan(topic, ns);
+                }
             }
         }
 

@@ -11,7 +11,7 @@ use tracing::{info, warn};
 use zenoh::Session;
 
 /// When it is told for the first time, …
-const FIRST: Duration = Duration::from_secs(9);
+const FIRST: Duration = Duration::from_secs(7);
 /// … and how often again as long as something is missing.
 const AGAIN: Duration = Duration::from_secs(60);
 /// Clocks that differ by less are set alike.
@@ -75,13 +75,16 @@ impl Found {
         if self.numbers.len() >= SENDERS_MAX && !self.numbers.contains_key(&(topic.clone(), gid)) {
             return;
         }
-        let last = self.numbers.insert((topic.clone(), gid), number).unwrap_or(number - 1);
-        let Some(missing) = u64::try_from(number - last - 1).ok().filter(|missing| *missing > 0) else {
+        let before = number.saturating_sub(1);
+        let last = self.numbers.insert((topic.clone(), gid), number).unwrap_or(before);
+        let Some(missing) =
+            u64::try_from(number.saturating_sub(last).saturating_sub(1)).ok().filter(|missing| *missing > 0)
+        else {
             return;
         };
         let lost = self.lost.entry(topic.clone()).or_default();
         let before = *lost;
-        *lost += missing;
+        *lost = lost.saturating_add(missing);
         if before == 0 || before.ilog2() < lost.ilog2() {
             warn!(
                 topic,

@@ -1,7 +1,7 @@
 //! The connection to a robot's router, and what comes over it.
 
 use crate::bag::Topic;
-use crate::plan::kind;
+use crate::plan::{is_speech, kind};
 use crate::wire;
 use serde_json::{Value, json};
 use std::sync::Arc;
@@ -16,8 +16,8 @@ use super::RosRobot;
 
 /// Messages on their way; of a robot with 200 transforms and 40 scans a second, some seconds.
 const QUEUE: usize = 4096;
-/// No message that is read is longer.
-const MESSAGE_MAX_BYTES: usize = 8 << 20;
+/// No message that is read is longer: a scan of 100 000 rays, with intensities.
+const MESSAGE_MAX_BYTES: usize = 1 << 20;
 /// How long who latches a topic may take to answer.
 const HISTORY_WAIT: Duration = Duration::from_secs(5);
 
@@ -95,10 +95,13 @@ impl Ear {
         wanted.extend(topics_of("clock", &inside).map(|name| (name, kind::CLOCK)));
         for (name, kind) in wanted {
             let (sender, dropped) = (sender.clone(), dropped.clone());
+            let wanted = robot.topics.clone();
+            // Of all the texts of a robot only what people say.
+            let is_wanted = move |name: &str| kind != kind::TEXT || is_speech(name, &wanted);
             session
                 .declare_subscriber(wire::key(robot.domain, &name, kind, "*"))
                 .allowed_origin(Locality::Remote)
-                .callback(move |sample| hand_over(&sender, &dropped, &sample))
+                .callback(move |sample| hand_over(&sender, &dropped, &sample, &is_wanted))
                 .background()
                 .await?;
         }
@@ -107,7 +110,7 @@ impl Ear {
             session
                 .declare_subscriber(wire::key(robot.domain, &name, kind::TF, "*"))
                 .allowed_origin(Locality::Remote)
-                .callback(move |sample| hand_over(&sender, &dropped, &sample))
+                .callback(move |sample| hand_over(&sender, &dropped, &sample, &|_| true))
                 .history(HistoryConfig::default().detect_late_publishers().max_samples(1))
                 .recovery(RecoveryConfig::default().heartbeat())
                 .query_timeout(HISTORY_WAIT)
@@ -127,8 +130,14 @@ fn topics_of(name: &str, inside: &str) -> impl Iterator<Item = String> {
     [own].into_iter().chain(of_all)
 }
 
-fn hand_over(sender: &Sender<Arrived>, dropped: &AtomicU64, sample: &Sample) {
-    let Some((name, kind)) = wire::topic_of(sample.key_expr().as_str()) else { return };
+fn hand_over(
+    sender: &Sender<Arrived>,
+    dropped: &AtomicU64,
+    sample: &Sample,
+    is_wanted: &dyn Fn(&str) -> bool,
+) {
+    let topic = wire::topic_of(sample.key_expr().as_str()).filter(|(name, _)| is_wanted(name));
+    let Some((name, kind)) = topic else { return };
     if sample.payload().len() > MESSAGE_MAX_BYTES {
         dropped.fetch_add(1, Ordering::Relaxed);
         return;

@@ -6,14 +6,15 @@ use super::{Shared, found};
 use crate::cdr;
 use crate::frames::{self, Moving};
 use crate::msg::TFMessage;
-use crate::plan::kind;
+use crate::plan::{Source, kind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
+use toponym::guide::sentence;
 use toponym::log::Options;
 use toponym::robot::{Robot, RobotConfig};
 use toponym::{ClientError, Guide};
-use toponym_proto::{Clock, Message};
+use toponym_proto::{Clock, Message, Say};
 use tracing::{info, warn};
 
 /// Stamps that differ so little from this machine's time are of the same kind of clock.
@@ -49,7 +50,15 @@ pub async fn take_in(shared: Arc<Shared>, mut ear: Ear) -> Result<(), String> {
                     let config =
                         RobotConfig { site: shared.site.clone(), clock, ..RobotConfig::new(&ros.robot) };
                     boot = config.boot.max(boot + 1);
-                    shared.tf_topic.send_replace(feed.survey().tf_topic(&ros.namespace));
+                    let topic = match &plan.odometry {
+                        Source::Tf { topic, .. } => topic.clone(),
+                        Source::Topic { .. } | Source::None => feed.survey().tf_topic(&ros.namespace),
+                    };
+                    shared
+                        .tf_topic
+                        .send_if_modified(|known| std::mem::replace(known, topic.clone()) != topic);
+                    // Where an earlier stream was says nothing of this one.
+                    shared.pose.send_replace(None);
                     found::tell_plan(&shared, &plan);
                     shared.plan.send_replace(Some(plan));
                     let config = RobotConfig { boot, ..config };
@@ -57,7 +66,8 @@ pub async fn take_in(shared: Arc<Shared>, mut ear: Ear) -> Result<(), String> {
                 }
                 Fed::Message(Message::Say(say)) => {
                     info!(robot = ros.robot, "somebody speaks");
-                    guide.publish(&say).await
+                    // A bag's ids are of its stamps, which a simulator's clock repeats.
+                    guide.publish(&Say { id: sentence(&say.text).id, ..say }).await
                 }
                 Fed::Message(message) => match &mut robot {
                     Some(robot) => robot.send(message).await.map(|_| ()),
@@ -81,7 +91,7 @@ fn tell_refusal(shared: &Shared, told: &mut Option<String>, sent: Result<(), Cli
 
 /// Whether somebody else tells where the robot's odometry lies in a map.
 fn notice_others(shared: &Shared, arrived: &Arrived) {
-    if arrived.topic.kind != kind::TF || arrived.topic.name.ends_with("_static") {
+    if arrived.topic.kind != kind::TF || arrived.topic.name != *shared.tf_topic.borrow() {
         return;
     }
     let odom = shared.plan.borrow().as_ref().and_then(|plan| plan.moving().map(|m| m.parent.clone()));

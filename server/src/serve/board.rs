@@ -18,7 +18,7 @@ use super::answered::Answered;
 use super::door::Arrival;
 use super::scribe::Work;
 use crate::fold::Card;
-use crate::web::Published;
+use crate::web::{LAST_EVENT, Published};
 
 /// Events kept for a page that is slow.
 const EVENTS: usize = 1024;
@@ -160,6 +160,8 @@ pub struct Board {
     pub beat_ms: AtomicU64,
     /// When the server began.
     pub began: Instant,
+    /// Whether the server stops: pages connect to the next.
+    pub stopped: AtomicBool,
     /// What is published, for pages; who does not follow misses some.
     pub events: broadcast::Sender<Arc<Published>>,
     /// Way to the intake, for commands that it carries out; none before it runs.
@@ -183,9 +185,17 @@ impl Board {
             data: data.into(),
             beat_ms: AtomicU64::new(0),
             began: Instant::now(),
+            stopped: AtomicBool::new(false),
             events: broadcast::Sender::new(EVENTS),
             control: OnceLock::new(),
         }
+    }
+
+    /// Tells pages that this server answers no more.
+    pub fn leave(&self) {
+        self.stopped.store(true, Ordering::Release);
+        let _ =
+            self.events.send(Arc::new(Published { name: LAST_EVENT, json: Vec::new(), of: String::new() }));
     }
 
     /// Counts that a limit was reached.

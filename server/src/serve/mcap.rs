@@ -7,7 +7,7 @@ use std::fs::File;
 use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::time::{Duration, Instant};
 use tokio::task::JoinHandle;
 use toponym::{ClientError, Planner};
@@ -103,10 +103,13 @@ fn free(file: &Path) -> PathBuf {
     std::iter::once(file.to_owned()).chain(numbered).find(|f| !f.exists()).unwrap_or_else(|| file.to_owned())
 }
 
-fn enter(sender: &SyncSender<Line>, line: Line) {
-    if sender.try_send(line).is_err() {
+/// Whether it will be written. Where nobody writes any more that was told.
+fn enter(sender: &SyncSender<Line>, line: Line) -> bool {
+    let entered = sender.try_send(line);
+    if matches!(entered, Err(TrySendError::Full(_))) {
         warn!("the MCAP file cannot follow: a message is left out of it");
     }
+    entered.is_ok()
 }
 
 /// Its topics: those of the usual map have the usual names.
@@ -138,8 +141,9 @@ async fn draw(session: &Session, board: &Board, sender: &SyncSender<Line>) {
             }
             match picture(session, &board.site, &map.id).await {
                 Ok(line) => {
-                    enter(sender, line);
-                    drawn.insert(map.id, state);
+                    if enter(sender, line) {
+                        drawn.insert(map.id, state);
+                    }
                 }
                 Err(e) => debug!(map = map.id, "no picture for the MCAP file: {e}"),
             }

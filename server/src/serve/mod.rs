@@ -47,6 +47,7 @@ use intake::Intake;
 use maps::Maps;
 use outbox::Outbox;
 use recording::Recordings;
+use std::net::SocketAddr;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::sync_channel;
@@ -108,6 +109,7 @@ pub struct Server {
     watchers: Vec<tokio::task::JoinHandle<()>>,
     mcap: Option<mcap::Mcap>,
     endpoints: Vec<String>,
+    pages: Option<SocketAddr>,
 }
 
 /// Serves until `shutdown` is ready; then takes in what has arrived, saves all maps and returns.
@@ -137,13 +139,15 @@ impl Server {
         let endpoints = session.info().locators().await.iter().map(ToString::to_string).collect();
         let board = Arc::new(Board::new(keys.clone(), &config.site, &config.data, config.words()?));
         let records = record.map(Recordings::new).transpose()?;
-        let mut watchers = Vec::new();
+        let (mut watchers, mut pages) = (Vec::new(), None);
         let (outbox, publisher) = Outbox::start(board.clone(), session.clone())?;
         let mut maps = Maps::new(config.clone(), board.clone(), outbox.clone(), store, records);
         maps.start_saved()?;
         let (door, arrivals) = Door::new(board.clone(), &config);
         if let Some(address) = &config.http {
-            watchers.push(web::serve(board.clone(), door.clone(), &config, &policy, address).await?);
+            let (served, at) = web::serve(board.clone(), door.clone(), &config, &policy, address).await?;
+            watchers.push(served);
+            pages = at;
         }
         let (limits, robots, mcap) = (config.limits.clone(), config.ros.clone(), config.mcap.clone());
         let intake = Intake::new(config, board.clone(), outbox.clone(), maps);
@@ -172,6 +176,7 @@ impl Server {
             watchers,
             mcap,
             endpoints,
+            pages,
         };
         info!(site = server.board.site, endpoints = server.endpoints.join(" "), "listening");
         Ok(server)
@@ -187,10 +192,16 @@ impl Server {
         &self.endpoints
     }
 
+    /// Where the pages are.
+    pub fn pages(&self) -> Option<SocketAddr> {
+        self.pages
+    }
+
     /// Takes in what has arrived, saves all maps, closes the network. A map that could not be saved
     /// is an error, told when all is closed.
     pub async fn stop(self) -> Result<(), ServeError> {
-        let Self { session, door, intake, outbox, publisher, watchers, mcap, .. } = self;
+        let Self { session, board, door, intake, outbox, publisher, watchers, mcap, .. } = self;
+        board.leave();
         for watcher in &watchers {
             watcher.abort();
         }

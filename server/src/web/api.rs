@@ -1,12 +1,13 @@
 //! Questions, sentences, commands: as over Zenoh.
 
 use super::Web;
+use super::guard::Who;
 use crate::serve::queries::{self, Reply};
-use axum::Json;
 use axum::body::{Body, to_bytes};
 use axum::extract::{Path, Request, State};
 use axum::http::{HeaderValue, StatusCode, Uri, header};
 use axum::response::{IntoResponse, Response};
+use axum::{Extension, Json};
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::time::Duration;
@@ -61,10 +62,18 @@ pub async fn command(State(web): State<Arc<Web>>, uri: Uri) -> Response {
 }
 
 /// What was said of a map: id, text, stamp, and whether it still stands.
-pub async fn sentences(State(web): State<Arc<Web>>, Path(id): Path<String>) -> Response {
+pub async fn sentences(
+    State(web): State<Arc<Web>>,
+    Extension(who): Extension<Who>,
+    Path(id): Path<String>,
+) -> Response {
     let Some(view) = web.board.maps.load().get(&id).cloned() else {
         return told(Problem::new(ErrorCode::NoSuchMap, format!("there is no map {id:?}")).field("map"));
     };
+    if !who.may_hear(&view.robot) {
+        let problem = Problem::new(ErrorCode::BadArgument, "you may not hear this robot").field("map");
+        return refuse(StatusCode::FORBIDDEN, problem);
+    }
     let snapshot = view.snapshot.load_full();
     let sentence =
         |s: Sentence| json!({"id": s.id, "stamp_ns": s.stamp_ns, "text": s.text, "stands": s.stands});
@@ -93,14 +102,15 @@ async fn answer(web: Arc<Web>, uri: Uri) -> Response {
     }
 }
 
-/// A sentence. Answers what became of it, or, if that takes longer, that it is on disk.
+/// A sentence. Answers that it is on disk and how it was read, as soon as that is so; with `until=final`, what became of it.
 pub async fn say(State(web): State<Arc<Web>>, request: Request) -> Response {
     let is_json = |kind: &HeaderValue| kind.to_str().is_ok_and(|kind| kind.starts_with(ENCODING_JSON));
     if !request.headers().get(header::CONTENT_TYPE).is_some_and(is_json) {
         let problem = Problem::new(ErrorCode::BadArgument, "a sentence is application/json");
         return refuse(StatusCode::UNSUPPORTED_MEDIA_TYPE, problem.field("content-type"));
     }
-    let (key, _) = selected(&web, request.uri());
+    let (key, arguments) = selected(&web, request.uri());
+    let to_the_end = arguments == "until=final";
     let bytes = match body(request.into_body()).await {
         Ok(bytes) => bytes,
         Err(refused) => return *refused,
@@ -118,12 +128,13 @@ pub async fn say(State(web): State<Arc<Web>>, request: Request) -> Response {
         return told(Problem::new(ErrorCode::Busy, "too much is said at once: say it again"));
     }
     let (until, mut last) = (Instant::now() + HEARD_WAIT, None);
+    let is_enough = |heard: &Heard| is_final(heard) || (heard.durable && !to_the_end);
     loop {
         match timeout_at(until, heard.recv()).await {
             Ok(Ok(event)) if event.name == "heard" => {
                 let of_it = serde_json::from_slice::<Heard>(&event.json).ok().filter(|heard| heard.id == id);
                 let Some(of_it) = of_it else { continue };
-                if is_final(&of_it) {
+                if is_enough(&of_it) {
                     return answered(&of_it);
                 }
                 last = Some(of_it);

@@ -16,6 +16,9 @@ use tokio::sync::broadcast::error::RecvError;
 /// A page shows a robot's pose so often: those between are left out.
 const POSE_PERIOD: Duration = Duration::from_millis(500);
 
+/// Nothing happens after it.
+pub const LAST_EVENT: &str = "end";
+
 /// Something that happened.
 #[derive(Debug)]
 pub struct Published {
@@ -32,19 +35,25 @@ pub async fn events(
     State(web): State<Arc<Web>>,
     Extension(who): Extension<Who>,
 ) -> Sse<impl Stream<Item = Result<Sent, Infallible>>> {
-    let may_hear = who.may_hear();
-    let begin = (web.board.events.subscribe(), BTreeMap::<String, Instant>::new());
-    let next = move |(mut events, mut shown): (Receiver<Arc<Published>>, BTreeMap<String, Instant>)| async move {
+    let begin = (web.board.events.subscribe(), BTreeMap::<String, Instant>::new(), who);
+    let next = move |(mut events, mut shown, who): (
+        Receiver<Arc<Published>>,
+        BTreeMap<String, Instant>,
+        Who,
+    )| async move {
         loop {
             let event = match events.recv().await {
                 Ok(event) => event,
                 Err(RecvError::Lagged(missed)) => {
                     let told = Sent::default().event("missed").data(missed.to_string());
-                    return Some((Ok(told), (events, shown)));
+                    return Some((Ok(told), (events, shown, who)));
                 }
                 Err(RecvError::Closed) => return None,
             };
-            if event.name == "heard" && !may_hear {
+            if event.name == LAST_EVENT {
+                return None;
+            }
+            if event.name == "heard" && !who.may_hear(&event.of) {
                 continue;
             }
             if event.name == "pose" {
@@ -55,7 +64,7 @@ pub async fn events(
                 shown.insert(event.of.clone(), now);
             }
             let json = String::from_utf8_lossy(&event.json);
-            return Some((Ok(Sent::default().event(event.name).data(json)), (events, shown)));
+            return Some((Ok(Sent::default().event(event.name).data(json)), (events, shown, who)));
         }
     };
     Sse::new(unfold(begin, next)).keep_alive(KeepAlive::default())

@@ -3,7 +3,6 @@
 use super::Web;
 use super::api::refuse;
 use crate::access::{Policy, Role, User};
-use crate::config::ServerConfig;
 use axum::extract::{Request, State};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
@@ -11,6 +10,7 @@ use axum::response::Response;
 use base64::Engine as _;
 use base64::engine::general_purpose::STANDARD;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use toponym_proto::answer::{ErrorCode, Problem};
 
 /// What pages may load: what they were served with, and nothing else from anywhere.
@@ -21,8 +21,8 @@ const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src '
 /// Whom the pages are for.
 pub struct Guard {
     policy: Policy,
-    /// Names under which the server may be asked for.
-    hosts: Vec<String>,
+    /// Names under which the server may be asked for; none: any.
+    hosts: Option<Vec<String>>,
 }
 
 /// Who asks.
@@ -35,12 +35,8 @@ pub struct Who {
 }
 
 impl Guard {
-    /// For what listens at an address and port.
-    pub fn new(config: &ServerConfig, policy: &Policy, address: &str, port: u16) -> Self {
-        let own = address.rsplit_once(':').map_or(address, |(host, _)| host).to_owned();
-        let names = ["localhost", "127.0.0.1", "[::1]"].map(str::to_owned).into_iter().chain([own]);
-        let mut hosts: Vec<String> = names.map(|name| format!("{name}:{port}")).collect();
-        hosts.extend(config.http_hosts.iter().cloned());
+    /// For those names; none: for any.
+    pub fn new(policy: &Policy, hosts: Option<Vec<String>>) -> Self {
         Self { policy: policy.clone(), hosts }
     }
 
@@ -69,27 +65,41 @@ impl Who {
         let is = |roles: &[Role]| self.role == Role::Trusted || roles.contains(&self.role);
         let chunks: Vec<&str> = path.trim_matches('/').split('/').collect();
         match chunks[..] {
-            ["robot", robot, "say"] => {
-                is(&[Role::Guide]) && (self.robots.is_empty() || self.robots.iter().any(|own| own == robot))
-            }
+            ["robot", robot, "say"] => is(&[Role::Guide]) && self.is_about(robot),
             ["do", "undo" | "rename" | "forget"] => is(&[Role::Guide, Role::Operator]),
             ["do", _] => is(&[Role::Operator]),
-            ["robot", _, "out", "heard"] | ["map", _, "sentences"] => self.may_hear(),
+            ["robot", robot, "out", "heard"] => self.may_hear(robot),
+            ["map", _, "sentences"] => self.may_hear_some(),
             ["robot", _, "out", _] | ["map", ..] | ["events"] => {
                 is(&[Role::Guide, Role::Planner, Role::Viewer, Role::Operator])
             }
-            _ => method == Method::GET,
+            _ => matches!(*method, Method::GET | Method::HEAD),
         }
     }
 
-    /// Whether they may know what people say.
-    pub fn may_hear(&self) -> bool {
+    fn is_about(&self, robot: &str) -> bool {
+        self.robots.is_empty() || self.robots.iter().any(|own| own == robot)
+    }
+
+    fn may_hear_some(&self) -> bool {
         [Role::Trusted, Role::Guide, Role::Operator].contains(&self.role)
+    }
+
+    /// Whether they may know what people say to a robot.
+    pub fn may_hear(&self, robot: &str) -> bool {
+        self.may_hear_some() && self.is_about(robot)
     }
 }
 
 /// Lets through what is asked of this host by one of its own pages, or by no page, by whom it is for.
 pub async fn guard(State(web): State<Arc<Web>>, mut request: Request, next: Next) -> Response {
+    if web.board.stopped.load(Ordering::Acquire) {
+        // A connection that was kept: the next one finds the next server.
+        let problem = Problem::new(ErrorCode::Busy, "the server begins anew: ask again");
+        let mut response = refuse(StatusCode::SERVICE_UNAVAILABLE, problem);
+        response.headers_mut().insert(header::CONNECTION, HeaderValue::from_static("close"));
+        return response;
+    }
     let mut response = match admit(&web.guard, &request) {
         Ok(who) => {
             request.extensions_mut().insert(who);
@@ -109,9 +119,12 @@ pub async fn guard(State(web): State<Arc<Web>>, mut request: Request, next: Next
 
 fn admit(guard: &Guard, request: &Request) -> Result<Who, Box<Response>> {
     let text = |name| request.headers().get(name).and_then(|value: &HeaderValue| value.to_str().ok());
-    let host = text(header::HOST).unwrap_or_default();
+    // HTTP/2 has it in the address.
+    let host = request.uri().authority().map(axum::http::uri::Authority::as_str);
+    let host = host.or_else(|| text(header::HOST)).unwrap_or_default();
     let no = |status, problem| Box::new(refuse(status, problem));
-    if !guard.hosts.iter().any(|known| known.eq_ignore_ascii_case(host)) {
+    let is_named = |known: &Vec<String>| known.iter().any(|name| name.eq_ignore_ascii_case(host));
+    if !guard.hosts.as_ref().is_none_or(is_named) {
         // Or any page could have a browser ask by a name of its own that leads here.
         let problem = Problem::new(ErrorCode::BadArgument, "this server has another name")
             .field("host")

@@ -20,7 +20,7 @@ mod guard;
 mod pages;
 mod tiles;
 
-pub use events::Published;
+pub use events::{LAST_EVENT, Published};
 pub use guard::Guard;
 
 use crate::access::Policy;
@@ -31,7 +31,9 @@ use crate::serve::{queries, watch};
 use axum::Router;
 use axum::middleware::from_fn_with_state;
 use axum::routing::{get, post};
-use std::io::ErrorKind;
+use axum_server::tls_rustls::RustlsConfig;
+use std::io::{self, ErrorKind};
+use std::net::SocketAddr;
 use std::sync::Arc;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
@@ -46,46 +48,69 @@ pub struct Web {
     tiles: tiles::Tiles,
 }
 
-/// Serves at `config.http` until the task is aborted.
+/// Serves at an address until the task is aborted; tells where.
 ///
 /// # Errors
-/// If nobody can listen there.
+/// If nobody can listen there; if the certificate can't be used.
 pub async fn serve(
     board: Arc<Board>,
     door: Door,
     config: &ServerConfig,
     policy: &Policy,
     address: &str,
-) -> std::io::Result<JoinHandle<()>> {
+) -> io::Result<(JoinHandle<()>, Option<SocketAddr>)> {
     let listener = match TcpListener::bind(address).await {
         Ok(listener) => listener,
         // Nobody asked for it here: two servers on one machine are no error.
         Err(e) if e.kind() == ErrorKind::AddrInUse && address == DEFAULT_HTTP => {
             warn!("no pages: {address} is in use, perhaps by another server; --http names another address");
-            return Ok(tokio::spawn(std::future::pending()));
+            return Ok((tokio::spawn(std::future::pending()), None));
         }
-        Err(e) => return Err(std::io::Error::new(e.kind(), format!("cannot listen on http {address}: {e}"))),
+        Err(e) => return Err(io::Error::new(e.kind(), format!("cannot listen on http {address}: {e}"))),
     };
     let local = listener.local_addr()?;
     let health = watch::routes(board.clone());
-    let router = if local.ip().is_loopback() {
-        info!("pages: http://{local}/ shows the map, http://{local}/guide is for whoever talks");
-        let permits = queries::Permits::new(&config.limits);
-        let guard = Guard::new(config, policy, address, local.port());
-        routes(Arc::new(Web { board, door, guard, permits, tiles: tiles::Tiles::default() })).merge(health)
+    let tls = config.access.tls.as_ref().filter(|_| !local.ip().is_loopback() && policy.by_password());
+    let pages = |guard| {
+        let (permits, tiles) = (queries::Permits::new(&config.limits), tiles::Tiles::default());
+        routes(Arc::new(Web { board, door, guard, permits, tiles })).merge(health.clone())
+    };
+    let served = if local.ip().is_loopback() {
+        tell("http", local);
+        let router = pages(Guard::new(policy, Some(hosts(config, address, local.port()))));
+        tokio::spawn(async move { ended(axum::serve(listener, router).await) })
+    } else if let Some(tls) = tls {
+        tell("https", local);
+        // What a certificate is not of, no browser shows.
+        let router = pages(Guard::new(policy, None)).into_make_service();
+        let tls = RustlsConfig::from_pem_file(&tls.certificate, &tls.key).await?;
+        let server = axum_server::from_tcp_rustls(listener.into_std()?, tls)?;
+        tokio::spawn(async move { ended(server.serve(router).await) })
     } else {
         warn!(
-            "http: /healthz and /metrics alone at {local}: pages are for this machine only, as a browser beyond needs \
-             encryption: put a proxy with TLS in front of --http 127.0.0.1:{}",
-            local.port()
+            "http: /healthz and /metrics alone at {local}: beyond this machine pages need users (`toponym-server user add \
+             anna --role guide`) and a certificate (`toponym-server cert new`, [access.tls])"
         );
-        health
+        tokio::spawn(async move { ended(axum::serve(listener, health).await) })
     };
-    Ok(tokio::spawn(async move {
-        if let Err(e) = axum::serve(listener, router).await {
-            error!("http: {e}");
-        }
-    }))
+    Ok((served, Some(local)))
+}
+
+fn tell(scheme: &str, local: SocketAddr) {
+    info!("pages: {scheme}://{local}/ shows the map, {scheme}://{local}/guide is for whoever talks");
+}
+
+fn ended(served: io::Result<()>) {
+    if let Err(e) = served {
+        error!("http: {e}");
+    }
+}
+
+/// Names under which a server without a certificate may be asked for.
+fn hosts(config: &ServerConfig, address: &str, port: u16) -> Vec<String> {
+    let own = address.rsplit_once(':').map_or(address, |(host, _)| host);
+    let names = ["localhost", "127.0.0.1", "[::1]", own].into_iter();
+    names.map(|name| format!("{name}:{port}")).chain(config.http_hosts.iter().cloned()).collect()
 }
 
 fn routes(web: Arc<Web>) -> Router {

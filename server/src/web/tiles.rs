@@ -2,14 +2,17 @@
 
 use super::Web;
 use super::api::refuse;
-use crate::serve::board::{MapView, lock};
+use crate::serve::board::MapView;
 use axum::Json;
+use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
+use tokio::sync::Mutex;
+use tokio::task::spawn_blocking;
 use toponym_core::Snapshot;
 use toponym_core::answers::query::Grid;
 use toponym_proto::answer::{ANSWER_VERSION, ErrorCode, MapIdentity, Problem};
@@ -23,6 +26,7 @@ const RESOLUTION_M: f64 = 0.1;
 /// The newest tiles of each map.
 #[derive(Default)]
 pub struct Tiles {
+    /// Held while they are made: others wait for the same.
     of: Mutex<BTreeMap<String, Arc<Tiled>>>,
 }
 
@@ -61,15 +65,23 @@ struct TileEntry {
 
 impl Tiles {
     /// The tiles of a map as it is now: made once for each state of it, however many look.
-    fn of(&self, view: &MapView) -> Arc<Tiled> {
+    async fn of(&self, view: Arc<MapView>) -> Result<Arc<Tiled>, Problem> {
+        let mut all = self.of.lock().await;
         let snapshot = view.snapshot.load_full();
         let map = view.identity(&snapshot);
-        if let Some(known) = lock(&self.of).get(&view.id).filter(|tiled| tiled.map == map) {
-            return known.clone();
+        if let Some(known) = all.get(&view.id).filter(|tiled| tiled.map == map) {
+            return Ok(known.clone());
         }
-        let tiled = Arc::new(Tiled::new(map, &snapshot));
-        lock(&self.of).insert(view.id.clone(), tiled.clone());
-        tiled
+        let made = spawn_blocking(move || Arc::new(Tiled::new(map, &snapshot))).await;
+        let tiled = made.map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))?;
+        all.insert(view.id.clone(), tiled.clone());
+        Ok(tiled)
+    }
+
+    /// A tile of the newest that were asked for.
+    async fn last(&self, id: &str, at: (i64, i64)) -> Option<(String, Vec<u8>)> {
+        let all = self.of.lock().await;
+        all.get(id)?.tiles.get(&at).map(|tile| (tile.hash.clone(), tile.png.clone()))
     }
 }
 
@@ -99,36 +111,25 @@ fn tiles(grid: &Grid) -> BTreeMap<(i64, i64), Tile> {
     drawn.collect()
 }
 
-fn map(web: &Web, id: &str) -> Result<Arc<MapView>, Box<Response>> {
-    let no = || Problem::new(ErrorCode::NoSuchMap, format!("there is no map {id:?}")).field("map");
-    web.board.maps.load().get(id).cloned().ok_or_else(|| Box::new(refuse(StatusCode::NOT_FOUND, no())))
-}
-
-async fn tiled(web: Arc<Web>, id: &str) -> Result<Arc<Tiled>, Box<Response>> {
-    let view = map(&web, id)?;
-    let made = tokio::task::spawn_blocking(move || web.tiles.of(&view)).await;
-    made.map_err(|e| {
-        let problem = Problem::new(ErrorCode::Internal, e.to_string());
-        Box::new(refuse(StatusCode::INTERNAL_SERVER_ERROR, problem))
-    })
-}
-
 /// Which tiles there are.
 pub async fn list(State(web): State<Arc<Web>>, Path(id): Path<String>) -> Response {
-    match tiled(web, &id).await {
-        Ok(tiled) => {
-            let entry = |(&(x, y), tile): (&(i64, i64), &Tile)| TileEntry { x, y, hash: tile.hash.clone() };
-            let reply = TilesReply {
-                v: ANSWER_VERSION,
-                map: tiled.map.clone(),
-                resolution_m: tiled.resolution_m,
-                tile_cells: TILE,
-                tiles: tiled.tiles.iter().map(entry).collect(),
-            };
-            ([(header::CACHE_CONTROL, "no-store")], Json(reply)).into_response()
-        }
-        Err(refused) => *refused,
-    }
+    let Some(view) = web.board.maps.load().get(&id).cloned() else {
+        let problem = Problem::new(ErrorCode::NoSuchMap, format!("there is no map {id:?}")).field("map");
+        return refuse(StatusCode::NOT_FOUND, problem);
+    };
+    let tiled = match web.tiles.of(view).await {
+        Ok(tiled) => tiled,
+        Err(problem) => return refuse(StatusCode::INTERNAL_SERVER_ERROR, problem),
+    };
+    let entry = |(&(x, y), tile): (&(i64, i64), &Tile)| TileEntry { x, y, hash: tile.hash.clone() };
+    let reply = TilesReply {
+        v: ANSWER_VERSION,
+        map: tiled.map.clone(),
+        resolution_m: tiled.resolution_m,
+        tile_cells: TILE,
+        tiles: tiled.tiles.iter().map(entry).collect(),
+    };
+    ([(header::CACHE_CONTROL, "no-store")], Json(reply)).into_response()
 }
 
 /// Which state of a tile.
@@ -137,27 +138,24 @@ pub struct Which {
     hash: Option<String>,
 }
 
-/// One tile, as it is now: an indexed PNG, as `ask/grid` has it.
+/// One tile of those listed last: an indexed PNG, as `ask/grid` has it.
 pub async fn tile(
     State(web): State<Arc<Web>>,
-    Path((id, x, y)): Path<(String, i64, i64)>,
+    path: Result<Path<(String, i64, i64)>, PathRejection>,
     Query(which): Query<Which>,
 ) -> Response {
-    let tiled = match tiled(web, &id).await {
-        Ok(tiled) => tiled,
-        Err(refused) => return *refused,
+    let tile = match path {
+        Ok(Path((id, x, y))) => web.tiles.last(&id, (x, y)).await,
+        Err(_) => None,
     };
-    let Some(tile) = tiled.tiles.get(&(x, y)) else {
-        let problem = Problem::new(ErrorCode::NoSuchQuery, "nothing is known there").field("tile");
-        return refuse(StatusCode::NOT_FOUND, problem);
+    let Some((hash, png)) = tile else {
+        let problem = Problem::new(ErrorCode::NoSuchQuery, "there is no such tile").field("tile");
+        return refuse(StatusCode::NOT_FOUND, problem.hint("/map/{map}/tiles lists those there are"));
     };
     // Whoever asked for this state of it need never ask again.
-    let keep = if which.hash.as_ref() == Some(&tile.hash) {
-        "private, max-age=86400, immutable"
-    } else {
-        "no-store"
-    };
-    ([(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, keep)], tile.png.clone()).into_response()
+    let keep =
+        if which.hash.as_ref() == Some(&hash) { "private, max-age=86400, immutable" } else { "no-store" };
+    ([(header::CONTENT_TYPE, "image/png"), (header::CACHE_CONTROL, keep)], png).into_response()
 }
 
 #[cfg(test)]

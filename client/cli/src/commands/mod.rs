@@ -1,5 +1,6 @@
 //! The command line: arguments, exit codes, and one function per command.
 
+mod dictate;
 mod find;
 mod grid;
 mod mend;

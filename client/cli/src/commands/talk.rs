@@ -1,5 +1,6 @@
 //! `toponym say`.
 
+use super::dictate::dictate;
 use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::path::PathBuf;
@@ -21,11 +22,13 @@ Examples:
   toponym say 'scratch that'
   toponym say 'das ist die Küche' --lang de
   toponym say 'this is the gym' --spool ~/said     nothing is lost if the server is away
+  recogniser | toponym say - --speak espeak-ng     a sentence a line: text, or JSON with alternatives
 
 It speaks of the place where the robot is now. Exit code 1 if it was not understood, or if the robot asks something
 back: say yes or no, at once or with --answers and the sentence's id.")]
 pub struct SayArgs {
-    /// The sentence.
+    /// The sentence; `-`: one a line from the standard input, as text or as JSON, {"text": …, "alternatives": [{"text": …,
+    /// "p": …}], "ago_s": …}; lines with "partial" are left out.
     text: String,
     /// To which robot; may be left out where there is exactly one.
     #[arg(long)]
@@ -48,6 +51,9 @@ pub struct SayArgs {
     /// Folder to keep the sentence in until it is in the map; what an earlier `say` left there is said again first.
     #[arg(long, value_name = "DIR")]
     spool: Option<PathBuf>,
+    /// A command that is given each answer as its last argument, to say it aloud; with `-`.
+    #[arg(long, value_name = "COMMAND")]
+    speak: Option<String>,
     /// How long to wait for the robot's answer.
     #[arg(long, value_name = "S", default_value = "10", value_parser = super::seconds)]
     timeout: Duration,
@@ -61,6 +67,9 @@ pub async fn say(to: &Connection, site: &str, args: &SayArgs) -> Result<u8, Fail
         answers: args.answers.clone(),
         ..sentence(&args.text)
     };
+    if args.text == "-" {
+        return dictate(to, site, &say, args.spool.as_deref(), args.speak.as_deref(), args.timeout).await;
+    }
     let opened = to.open().await;
     if opened.is_err()
         && let Some(folder) = &args.spool
@@ -154,6 +163,7 @@ mod tests {
             explain: false,
             map: "main".into(),
             spool: Some(folder.clone()),
+            speak: None,
             timeout: Duration::from_secs(1),
         };
         // Nothing listens on a port that was free a moment ago.

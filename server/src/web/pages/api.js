@@ -23,17 +23,26 @@ export const say = async (robot, sentence) =>
     method: "POST",
     headers: { "content-type": "application/json" },
     body: JSON.stringify(sentence),
+    signal: AbortSignal.timeout(ANSWER_MS),
   }));
+
+/** How long an answer may take. */
+const ANSWER_MS = 15_000;
+/** A stream of events that was refused is tried again after this. */
+const AGAIN_MS = 3000;
 
 /** Events as they come: `handlers` by name; `connection` is told whether there is one. */
 export function listen(handlers, connection) {
   const source = new EventSource("/events");
   source.onopen = () => connection(true);
-  source.onerror = () => connection(false);
+  source.onerror = () => {
+    connection(false);
+    // A browser tries again by itself, but not after an answer that is none.
+    if (source.readyState === EventSource.CLOSED) setTimeout(() => listen(handlers, connection), AGAIN_MS);
+  };
   for (const [name, handle] of Object.entries(handlers)) {
     source.addEventListener(name, (event) => handle(JSON.parse(event.data)));
   }
-  return source;
 }
 
 const LETTERS = "0123456789ABCDEFGHJKMNPQRSTVWXYZ";

@@ -50,6 +50,8 @@ export class Drawing {
     this.tiles = new Map();
     this.regions = [];
     this.graph = null;
+    /** Where the robot was since the graph was fetched. */
+    this.trail = [];
     this.robots = new Map();
     this.found = [];
     this.chosen = null;
@@ -122,7 +124,8 @@ export class Drawing {
   }
 
   setRegions(regions) {
-    this.regions = regions.map((r) => ({ ...r, middle: middle(r.polygon_m) }));
+    const known = new Map(this.regions.map((r) => [JSON.stringify(r.polygon_m), r.middle]));
+    this.regions = regions.map((r) => ({ ...r, middle: known.get(JSON.stringify(r.polygon_m)) ?? middle(r.polygon_m) }));
     this.draw();
   }
 
@@ -226,10 +229,7 @@ export class Drawing {
       }
     }
     this.drawGraph(c, px);
-    for (const r of this.regions) {
-      const name = r.names[0];
-      if (name && name.p >= LABEL_MIN) this.label(r.middle, name.label, name.p < 0.8 ? `${Math.round(100 * name.p)} %` : "");
-    }
+    this.drawLabels();
     for (const f of this.found) this.flag([f.x_m, f.y_m], `${Math.round(100 * f.probability)} %`);
     for (const pose of this.robots.values()) this.robot(pose);
   }
@@ -240,7 +240,7 @@ export class Drawing {
     c.lineWidth = 1.5 * px;
     c.strokeStyle = this.style("--way");
     c.beginPath();
-    this.path([...at.values()]);
+    this.path([...at.values(), ...this.trail]);
     c.stroke();
     if (!this.doubt) return;
     for (const [k, particle] of this.graph.particles.slice(0, 3).entries()) {
@@ -251,6 +251,24 @@ export class Drawing {
       c.stroke();
     }
     c.setLineDash([]);
+  }
+
+  /** Names, the surest and largest first; those that find no room wait until one comes closer. */
+  drawLabels() {
+    const c = this.context;
+    const size = 13 * this.ratio;
+    const placed = [];
+    const named = this.regions.filter((r) => r.names[0]?.p >= LABEL_MIN);
+    named.sort((a, b) => (b.id === this.chosen) - (a.id === this.chosen) || b.names[0].p * b.area_m2 - a.names[0].p * a.area_m2);
+    for (const { middle: at, names: [name] } of named) {
+      c.font = `600 ${size}px system-ui, sans-serif`;
+      const [x, y] = this.toScreen(at);
+      const half = c.measureText(name.label).width / 2 + 3 * this.ratio;
+      const box = [x - half, y - 0.7 * size, x + half, y + (name.p < 0.8 ? 1.6 : 0.7) * size];
+      if (placed.some((o) => box[0] < o[2] && o[0] < box[2] && box[1] < o[3] && o[1] < box[3])) continue;
+      placed.push(box);
+      this.label(at, name.label, name.p < 0.8 ? `${Math.round(100 * name.p)} %` : "");
+    }
   }
 
   label(point, text, sure) {

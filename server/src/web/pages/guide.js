@@ -10,15 +10,20 @@ const STATES = {
   not_understood: "not understood", refused: "not taken",
 };
 const MARKS = { waiting: "…", read: "✓", understood: "✓✓", asked: "?", not_understood: "✗", refused: "✗" };
+/** Sentences of which it was already told what became of them, and the items that show them. */
 const told = new Set();
-let current = [];
+const items = new Map();
+/** Robot → its map. */
+const maps = new Map();
+let connected = false;
+let outbox = null;
 
-const robot = () => at("robot").value || "any";
+const robot = () => at("robot").value || localStorage.getItem("toponym.robot") || "any";
 const lang = () => at("lang").value;
 
-function sentenceItem(s) {
+function sentenceItem(s, answered) {
   const buttons = [];
-  if (s.state === "asked") {
+  if (s.state === "asked" && !answered) {
     for (const answer of ["yes", "no"]) {
       const reply = () => outbox.add(s.robot, { text: answer, answers: s.id });
       buttons.push(element("button", { type: "button", onclick: reply }, answer));
@@ -36,48 +41,71 @@ function sentenceItem(s) {
     ...buttons);
 }
 
+/** Only what has changed is made anew: a screen reader tells that alone. */
 function show(sentences) {
-  current = sentences;
   const list = at("sentences");
   const atEnd = list.scrollHeight - list.scrollTop - list.clientHeight < 80;
-  list.replaceChildren(...sentences.map(sentenceItem));
+  const answered = new Set(sentences.map((s) => s.sentence.answers).filter(Boolean));
+  const now = new Set(sentences.map((s) => s.id));
+  for (const [id, { item }] of items) {
+    if (now.has(id)) continue;
+    item.remove();
+    items.delete(id);
+  }
+  for (const s of sentences) {
+    const looks = JSON.stringify([s, answered.has(s.id)]);
+    const known = items.get(s.id);
+    if (known?.looks === looks) continue;
+    const item = sentenceItem(s, answered.has(s.id));
+    if (known) known.item.replaceWith(item);
+    else list.append(item);
+    items.set(s.id, { item, looks });
+    announce(s);
+  }
   if (atEnd) list.scrollTop = list.scrollHeight;
-  for (const s of sentences.filter((s) => s.done && !told.has(s.id))) {
-    told.add(s.id);
-    if (document.readyState !== "complete" || Date.now() - s.saidAt > 60_000) continue;
-    navigator.vibrate?.(s.state === "understood" ? 60 : [60, 80, 60]);
-    if (at("aloud").checked && s.words) {
-      speechSynthesis?.speak(Object.assign(new SpeechSynthesisUtterance(s.words), { lang: "en" }));
-    }
+  status();
+}
+
+/** By touch and by voice, for whoever does not look. */
+function announce(s) {
+  if (!s.done || told.has(s.id)) return;
+  told.add(s.id);
+  if (Date.now() - s.addedAt > 60_000) return;
+  if (navigator.userActivation?.hasBeenActive) navigator.vibrate?.(s.state === "understood" ? 60 : [60, 80, 60]);
+  if (at("aloud").checked && s.words) {
+    globalThis.speechSynthesis?.speak(Object.assign(new SpeechSynthesisUtterance(s.words), { lang: "en" }));
   }
 }
 
-async function undo(s) {
+async function undo({ id, robot: of }) {
   try {
-    const mended = await command("undo", { id: s.id, map: maps.get(s.robot) });
-    s.undone = true;
-    s.words = mended.words;
+    const { words } = await command("undo", { id, map: maps.get(of) });
+    outbox.change(id, (s) => Object.assign(s, { undone: true, words }));
   } catch (error) {
-    s.words = error.message;
+    outbox.change(id, (s) => (s.words = error.message));
   }
-  outbox.keep();
 }
-
-/** Robot → its map. */
-const maps = new Map();
 
 async function findRobots() {
   const info = await ask("/info");
-  const chosen = at("robot").value || localStorage.getItem("toponym.robot");
+  const chosen = robot();
   maps.clear();
   for (const state of info.robots) if (state.map) maps.set(state.robot, state.map);
-  at("robot").replaceChildren(...[...maps.keys()].map((id) => element("option", { value: id, selected: id === chosen }, id)));
+  const options = [...maps.keys()].map((id) => element("option", { value: id, selected: id === chosen }, id));
+  at("robot").replaceChildren(...options);
+  if (maps.size === 1) localStorage.setItem("toponym.robot", robot());
 }
 
-function connected(is) {
-  const waiting = current.filter((s) => !s.sent && !s.done).length;
-  at("connection").textContent = is ? "connected" : `no connection: what you say is kept${waiting ? ` (${waiting} waiting)` : ""}`;
-  at("connection").className = is ? "good" : "bad";
+function status() {
+  const waiting = outbox?.waiting().length ?? 0;
+  const kept = waiting ? ` (${waiting} waiting)` : "";
+  at("connection").textContent = connected ? "connected" : `no connection: what you say is kept${kept}`;
+  at("connection").className = connected ? "good" : "bad";
+}
+
+function connection(is) {
+  connected = is;
+  status();
   if (is) {
     outbox.again();
     findRobots().catch(() => {});
@@ -86,27 +114,29 @@ function connected(is) {
 
 function talk() {
   const button = at("talk");
-  button.hidden = !(canListen() && globalThis.isSecureContext);
+  button.hidden = !canListen();
   let stop;
   const begin = (event) => {
     event.preventDefault();
     if (stop) return;
+    if (event.pointerId !== undefined) button.setPointerCapture(event.pointerId);
     button.classList.add("held");
-    button.setPointerCapture?.(event.pointerId ?? 0);
     stop = listenTo({
       lang: lang(),
       soFar: (text) => (at("sofar").textContent = text),
       failed: (why) => (at("sofar").textContent = `not heard: ${why}`),
       heard: ([best, ...others], began) => {
+        at("sofar").textContent = "";
         const alternatives = others.filter((o) => o.text && o.text !== best.text && o.p > 0 && o.p <= 1);
         outbox.add(robot(), { text: best.text, lang: lang(), alternatives }, began);
       },
+      // Only then is there room for another.
+      ended: () => (stop = undefined),
     });
   };
   const end = () => {
     button.classList.remove("held");
     stop?.();
-    stop = undefined;
   };
   button.addEventListener("pointerdown", begin);
   button.addEventListener("pointerup", end);
@@ -114,6 +144,7 @@ function talk() {
   button.addEventListener("contextmenu", (event) => event.preventDefault());
   button.addEventListener("keydown", (event) => [" ", "Enter"].includes(event.key) && !event.repeat && begin(event));
   button.addEventListener("keyup", (event) => [" ", "Enter"].includes(event.key) && end());
+  button.addEventListener("blur", end);
 }
 
 async function keepAwake() {
@@ -124,8 +155,9 @@ async function keepAwake() {
   }
 }
 
-const outbox = new Outbox(show);
-show(outbox.sentences);
+const tellGoes = async () => (at("goes").textContent = await whereItGoes(lang()));
+outbox = new Outbox(show, (why) => (at("warning").textContent = why));
+outbox.again();
 at("typed").addEventListener("submit", (event) => {
   event.preventDefault();
   const text = at("text").value.trim();
@@ -134,12 +166,21 @@ at("typed").addEventListener("submit", (event) => {
   at("text").value = "";
 });
 at("robot").addEventListener("change", () => localStorage.setItem("toponym.robot", robot()));
-at("lang").addEventListener("change", async () => (at("goes").textContent = await whereItGoes(lang())));
-document.addEventListener("visibilitychange", () => document.visibilityState === "visible" && keepAwake());
-addEventListener("offline", () => connected(false));
-listen({ heard: (heard) => outbox.heard(heard), state: () => maps.size || findRobots().catch(() => {}) }, connected);
+at("lang").addEventListener("change", tellGoes);
+document.addEventListener("visibilitychange", () => {
+  if (document.visibilityState !== "visible") return;
+  keepAwake();
+  // What was told while the page slept was not heard.
+  outbox.again();
+});
+addEventListener("offline", () => connection(false));
+listen({
+  heard: (heard) => outbox.heard(heard),
+  state: () => maps.size || findRobots().catch(() => {}),
+  missed: () => outbox.again(),
+}, connection);
 findRobots().catch(() => {});
 talk();
 keepAwake();
-at("goes").textContent = await whereItGoes(lang());
+tellGoes();
 navigator.serviceWorker?.register("/sw.js").catch(() => {});

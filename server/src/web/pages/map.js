@@ -3,8 +3,10 @@
 import { ask, command, element, listen } from "./api.js";
 import { Drawing } from "./drawing.js";
 
-/** A map that changes all the time is fetched no more often. */
-const REFRESH_MS = 3000;
+/** Tiles of a map that changes all the time are asked for no more often, … */
+const REFRESH_MS = 5000;
+/** … and rooms and the graph, which are whole, only so often, unless something was said or the map jumped. */
+const WHOLE_MS = 60_000;
 
 const at = (id) => document.getElementById(id);
 const drawing = new Drawing(at("canvas"));
@@ -13,27 +15,43 @@ let shown = false;
 let following = true;
 let due = null;
 let refreshing = false;
+let stale = false;
+let wholeAt = 0;
+let choice = 0;
 let sentences = new Map();
 
 const percent = (p) => `${Math.round(100 * p)} %`;
 
-async function tile(x, y, hash) {
-  const response = await fetch(`/map/${map}/tile/${x}/${y}?hash=${hash}`);
+async function tile(id, x, y, hash) {
+  const response = await fetch(`/map/${id}/tile/${x}/${y}?hash=${hash}`);
   if (!response.ok) throw new Error(response.statusText);
   return createImageBitmap(await response.blob());
 }
 
 async function refresh() {
-  if (refreshing || !map) return;
-  refreshing = true;
+  if (refreshing || !map) {
+    stale = true;
+    return;
+  }
+  const id = map;
+  [refreshing, stale] = [true, false];
   try {
-    const [tiles, { regions }, graph] = await Promise.all(
-      [ask(`/map/${map}/tiles`), ask(`/map/${map}/ask/regions`), ask(`/map/${map}/ask/graph`)]);
-    drawing.graph = graph;
-    drawing.setRegions(regions);
-    list(regions);
-    tellDoubt(graph);
-    await drawing.take(tiles, tile);
+    const whole = Date.now() - wholeAt > WHOLE_MS;
+    const none = Promise.resolve(null);
+    const [tiles, rooms, graph] = await Promise.all([ask(`/map/${id}/tiles`),
+      whole ? ask(`/map/${id}/ask/regions`) : none, whole ? ask(`/map/${id}/ask/graph`) : none]);
+    if (id !== map) return;
+    if (whole) {
+      wholeAt = Date.now();
+      drawing.graph = graph;
+      drawing.trail = [];
+      drawing.setRegions(rooms.regions);
+      list(rooms.regions);
+      tellDoubt(graph);
+    }
+    await drawing.take(tiles, (x, y, hash) => tile(id, x, y, hash));
+    if (id !== map) return;
+    at("connection").textContent = "";
     at("empty").hidden = tiles.tiles.length > 0;
     if (!shown && tiles.tiles.length) {
       shown = true;
@@ -41,9 +59,17 @@ async function refresh() {
     }
   } catch (error) {
     at("connection").textContent = error.message;
+    stale = true;
   } finally {
     refreshing = false;
+    if (stale || id !== map) changed();
   }
+}
+
+/** More than walls has changed. */
+function changedWhole() {
+  wholeAt = 0;
+  changed();
 }
 
 /** The map has changed: it is fetched soon, and not too often. */
@@ -60,6 +86,8 @@ function robotAt() {
 }
 
 function list(regions) {
+  // Whoever is at one of them is not to lose it.
+  if (at("rooms").contains(document.activeElement)) return;
   const from = robotAt();
   const distance = (r) => from && Math.hypot(r.middle[0] - from[0], r.middle[1] - from[1]);
   const rooms = drawing.regions.map((r) => ({ r, far: distance(r) })).filter(({ r }) => r.names.length || regions.length < 40);
@@ -98,6 +126,7 @@ async function because(name) {
 
 /** A room: what it may be called, why, and how to mend that. */
 async function choose(region, fly) {
+  const mine = ++choice;
   drawing.chosen = region.id;
   drawing.found = [];
   if (fly) {
@@ -111,13 +140,15 @@ async function choose(region, fly) {
   const doors = `${region.kind}, ${region.area_m2.toFixed(1)} m², ${region.doorways.length} doorways`;
   room.replaceChildren(element("h2", {}, title), element("p", {}, doors));
   await readSentences();
+  if (mine !== choice) return;
   for (const name of region.names) {
     const behind = element("ul", { class: "because" });
     const actions = element("p", {},
       element("button", { type: "button", onclick: () => rename(name.label, actions) }, "Rename"),
       element("button", { type: "button", onclick: () => mend("forget", { name: name.label }) }, "Forget"));
     room.append(element("h3", {}, `${name.label}: ${percent(name.p)}`), behind, actions);
-    const ids = (await because(name.label))(region.id);
+    const ids = await because(name.label).then((of) => of(region.id), () => []);
+    if (mine !== choice) return;
     behind.replaceChildren(...ids.map((id) => {
       const text = sentences.get(id)?.text ?? "a sentence";
       return element("li", {}, `“${text}” `, element("button", { type: "button", onclick: () => mend("undo", { id }) }, "Undo"));
@@ -144,6 +175,7 @@ async function mend(what, parameters) {
   } catch (error) {
     words = error.message;
   }
+  wholeAt = 0;
   at("room").replaceChildren(element("p", {}, words));
   await refresh();
 }
@@ -156,6 +188,7 @@ function bearing(rad) {
 }
 
 async function question(text) {
+  choice++;
   const answer = at("answer");
   answer.hidden = false;
   at("room").hidden = true;
@@ -247,11 +280,25 @@ async function findMaps() {
   at("map").replaceChildren(...info.maps.map(({ id }) => element("option", { value: id, selected: id === wanted }, id)));
   if (!info.maps.length) at("empty").hidden = false;
   if (wanted && wanted !== map) open(wanted);
+  // Where those are who stand still.
+  for (const { robot, map: of } of info.robots) {
+    if (of !== map) continue;
+    ask(`/robot/${robot}/out/pose`).then((pose) => {
+      drawing.robots.set(robot, pose);
+      drawing.draw();
+    }, () => {});
+  }
 }
 
 function open(id) {
   map = id;
   shown = false;
+  choice++;
+  at("room").hidden = at("answer").hidden = true;
+  drawing.setRegions([]);
+  drawing.graph = null;
+  drawing.trail = [];
+  wholeAt = 0;
   drawing.tiles.clear();
   drawing.robots.clear();
   drawing.found = [];
@@ -260,9 +307,10 @@ function open(id) {
 
 listen({
   pose: (pose) => {
-    if (pose.map.id !== map) return map ? undefined : findMaps();
+    if (pose.map.id !== map) return map ? undefined : findMaps().catch(() => {});
     drawing.robots.set(pose.robot, pose);
     const { x_m, y_m } = pose.map_from_body;
+    drawing.trail.push([x_m, y_m]);
     if (following && shown) {
       // Only when it nears the edge: a picture that never stands still is hard to read.
       const box = at("canvas").getBoundingClientRect();
@@ -271,13 +319,17 @@ listen({
     }
     drawing.draw();
   },
-  map: (identity) => identity.id === map ? changed() : findMaps(),
-  jump: changed,
-  missed: changed,
+  map: ({ id }) => {
+    if (id === map) changed();
+    else if (![...at("map").options].some((option) => option.value === id)) findMaps().catch(() => {});
+  },
+  heard: changedWhole,
+  jump: changedWhole,
+  missed: changedWhole,
 }, (is) => {
   at("connection").textContent = is ? "" : "no connection";
   at("connection").className = is ? "good" : "bad";
-  if (is) findMaps().then(changed).catch(() => {});
+  if (is) findMaps().then(changedWhole).catch(() => {});
 });
 at("map").addEventListener("change", () => open(at("map").value));
 at("asked").addEventListener("submit", (event) => {

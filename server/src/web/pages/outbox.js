@@ -1,106 +1,158 @@
-// Sentences until it is known what became of them: kept in the browser, sent in their order, again under the same id.
+// Sentences until it is known what became of them: kept in the browser, each by its id, sent in their order, and again
+// under the same id until the server has told how it ended.
 
 import { newId, say } from "./api.js";
 
-const KEPT = "toponym.outbox";
+const KEPT = "toponym.said.";
 const AGAIN_MS = [500, 1000, 2000, 4000, 8000];
-/** Of those that are done so many are shown. */
+/** Of those that are done so many are kept to be shown. */
 const DONE_MAX = 50;
+/** What is wrong with the sentence itself: it would be refused again. All else is tried again. */
+const WRONG = [400, 413, 415, 422];
+const NOT_YET = ["busy", "internal", "robot_ambiguous", "no_such_robot"];
 
 export class Outbox {
-  /** `changed` is called with all sentences, the newest last, whenever one changes. */
-  constructor(changed) {
+  /** `changed` is called with all sentences, the newest last; `warn` with what keeps them from being kept. */
+  constructor(changed, warn) {
     this.changed = changed;
-    this.sentences = JSON.parse(localStorage.getItem(KEPT) ?? "[]");
+    this.warn = warn;
+    /** What could not be stored: lost with the page. */
+    this.unstored = new Map();
+    /** Those that the server has had since it was last connected to. */
+    this.sent = new Set();
     this.tries = 0;
     this.sending = false;
     addEventListener("online", () => this.again());
-    // What another page of this browser has done.
-    addEventListener("storage", (event) => {
-      if (event.key === KEPT) this.read();
-    });
-    this.send();
+    addEventListener("storage", (event) => event.key?.startsWith(KEPT) && this.show());
   }
 
-  read() {
-    this.sentences = JSON.parse(localStorage.getItem(KEPT) ?? "[]");
-    this.changed(this.sentences);
+  /** All of them, in the order in which they were said. */
+  all() {
+    const kept = new Map(this.unstored);
+    try {
+      for (const key of Object.keys(localStorage)) {
+        if (!key.startsWith(KEPT) || kept.has(key.slice(KEPT.length))) continue;
+        try {
+          const sentence = JSON.parse(localStorage.getItem(key));
+          kept.set(sentence.id, sentence);
+        } catch {
+          localStorage.removeItem(key);
+        }
+      }
+    } catch {
+      // A browser that keeps nothing.
+    }
+    return [...kept.values()].sort((a, b) => a.addedAt - b.addedAt || (a.id < b.id ? -1 : 1));
   }
 
-  keep() {
-    const done = this.sentences.filter((s) => s.done);
-    const old = new Set(done.slice(0, Math.max(0, done.length - DONE_MAX)));
-    this.sentences = this.sentences.filter((s) => !old.has(s));
-    localStorage.setItem(KEPT, JSON.stringify(this.sentences));
-    this.changed(this.sentences);
+  find(id) {
+    return this.all().find((s) => s.id === id);
+  }
+
+  keep(sentence) {
+    try {
+      localStorage.setItem(KEPT + sentence.id, JSON.stringify(sentence));
+      this.unstored.delete(sentence.id);
+    } catch {
+      this.unstored.set(sentence.id, sentence);
+      this.warn("This browser's storage is full or shut: what you say is lost if the page is closed before it is sent.");
+    }
+  }
+
+  /** Changes one, as it is now. */
+  change(id, how) {
+    const sentence = this.find(id);
+    if (!sentence) return;
+    how(sentence);
+    this.keep(sentence);
+    this.show();
+  }
+
+  show() {
+    const all = this.all();
+    const done = all.filter((s) => s.done);
+    for (const { id } of done.slice(0, Math.max(0, done.length - DONE_MAX))) {
+      this.unstored.delete(id);
+      try {
+        localStorage.removeItem(KEPT + id);
+      } catch {
+        // As above.
+      }
+    }
+    this.changed(this.all());
   }
 
   /** Takes a sentence that began at `saidAt` (ms); sends it as soon as there is a connection. */
   add(robot, sentence, saidAt = Date.now()) {
-    this.read();
-    this.sentences.push({ id: newId(saidAt), robot, sentence, saidAt, state: "waiting", words: "", done: false });
-    this.keep();
+    const newest = this.all().at(-1)?.addedAt ?? 0;
+    const addedAt = Math.max(Date.now(), newest + 1);
+    this.keep({ id: newId(), robot, sentence, saidAt, addedAt, state: "waiting", words: "", done: false });
+    this.show();
     this.send();
   }
 
-  /** What an event tells of one of them. */
+  /** What is told of one of them, by an event or as an answer. What is done stays done. */
   heard(heard) {
-    const of = this.sentences.find((s) => s.id === heard.id);
-    if (!of || of.done) return;
-    this.settle(of, heard);
-    this.keep();
+    if (heard.status === "refused" && NOT_YET.includes(heard.error?.code)) return;
+    const known = this.find(heard.id);
+    if (!known || known.done) return;
+    this.change(heard.id, (s) => {
+      s.state = heard.status;
+      s.words = heard.question ?? (heard.words || heard.error?.message || "");
+      s.durable = s.durable || heard.durable;
+      s.late = undefined;
+      s.done = heard.status !== "read";
+    });
   }
 
-  settle(of, heard) {
-    of.state = heard.status;
-    of.words = heard.question ?? (heard.words || heard.error?.message || "");
-    of.question = heard.question ?? null;
-    of.durable = of.durable || heard.durable;
-    of.late = undefined;
-    of.sent = true;
-    of.done = heard.status !== "read";
-  }
-
+  /** There is a connection, perhaps after something was missed: all that is not done is asked for again. */
   again() {
     this.tries = 0;
+    this.sent.clear();
     clearTimeout(this.timer);
+    this.show();
     this.send();
+  }
+
+  waiting() {
+    return this.all().filter((s) => !s.done && !this.sent.has(s.id));
   }
 
   async send() {
     if (this.sending) return;
     this.sending = true;
-    // One page of a browser sends, or two would send out of order.
-    const work = () => this.sendAll();
-    if (navigator.locks) await navigator.locks.request("toponym.outbox", work);
-    else await work();
-    this.sending = false;
-    if (this.sentences.some((s) => !s.done && !s.sent)) {
-      this.timer = setTimeout(() => this.send(), AGAIN_MS[Math.min(this.tries++, AGAIN_MS.length - 1)]);
+    try {
+      // One page of a browser sends at a time, or two would send out of order.
+      const work = () => this.sendAll();
+      if (navigator.locks) await navigator.locks.request("toponym.outbox", work);
+      else await work();
+    } finally {
+      this.sending = false;
+      if (this.waiting().length) {
+        const wait = AGAIN_MS[Math.min(this.tries++, AGAIN_MS.length - 1)];
+        clearTimeout(this.timer);
+        this.timer = setTimeout(() => this.send(), wait);
+      }
     }
   }
 
   async sendAll() {
-    this.read();
-    for (let next; (next = this.sentences.find((s) => !s.done && !s.sent)); ) {
-      const ago_s = (Date.now() - next.saidAt) / 1000;
-      let told;
+    for (let next; (next = this.waiting()[0]); ) {
+      const ago_s = Math.max(0, (Date.now() - next.saidAt) / 1000);
       try {
-        told = await say(next.robot, { ...next.sentence, id: next.id, ago_s });
+        const heard = await say(next.robot, { ...next.sentence, id: next.id, ago_s });
+        if (!heard?.status) throw new Error("somebody else answers in the server's place");
+        this.heard(heard);
       } catch (error) {
-        const final = error.problem && ![408, 429, 502, 503, 504].includes(error.status) && error.status < 500;
-        if (!final) {
-          next.late = error.problem?.message ?? "no connection";
-          this.keep();
+        const code = error.problem?.code;
+        if (!(code && WRONG.includes(error.status) && !NOT_YET.includes(code))) {
+          this.change(next.id, (s) => (s.late = error.problem?.message ?? "no connection"));
           return;
         }
-        told = { id: next.id, status: "refused", words: error.message, error: error.problem };
+        this.heard({ id: next.id, status: "refused", words: error.message, error: error.problem, durable: false });
       }
       this.tries = 0;
-      this.read();
-      const of = this.sentences.find((s) => s.id === told.id);
-      if (of) this.settle(of, told);
-      this.keep();
+      this.sent.add(next.id);
     }
   }
 }
