@@ -55,6 +55,7 @@ pub fn init_logging() {
 pub async fn run(args: DemoArgs) -> Result<()> {
     let data = DataFolder::new();
     let config = ServerConfig {
+        http: None,
         // Port 0: any free one, so that the demo disturbs no server that is up.
         listen: vec!["tcp/127.0.0.1:0".into()],
         data: data.0.clone(),

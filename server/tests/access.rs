@@ -73,6 +73,7 @@ async fn ground(folder: &Scratch, policy: &Policy, mutual: bool) -> (Ground, Str
         clients_ca: mutual.then(|| folder.path("tls/ca.pem")),
     };
     let config = ServerConfig {
+        http: None,
         listen: vec!["quic/127.0.0.1:0".into()],
         data: folder.0.clone(),
         access: AccessConfig { policy: None, tls: Some(tls) },
@@ -175,6 +176,7 @@ async fn without_rules_all_that_is_tried_succeeds() {
 async fn without_users_this_machine_may_everything() {
     let folder = Scratch::new("local");
     let config = ServerConfig {
+        http: None,
         listen: vec!["tcp/127.0.0.1:0".into()],
         data: folder.0.clone(),
         ..ServerConfig::default()

@@ -20,6 +20,7 @@ async fn server(folder: &Path, site: &str) -> (Server, PathBuf) {
     let policy = Policy { local: false, users: [("router".to_owned(), router)].into() };
     policy.write(&data.join("policy.toml")).unwrap();
     let config = ServerConfig {
+        http: None,
         site: site.into(),
         listen: vec!["tcp/127.0.0.1:0".into()],
         data: data.clone(),

@@ -35,9 +35,13 @@ use axum_server::tls_rustls::RustlsConfig;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
 use std::sync::Arc;
+use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
 use tracing::{error, info, warn};
+
+/// A request's head comes within this.
+const HEAD_WAIT: Duration = Duration::from_secs(10);
 
 /// What all handlers know.
 pub struct Web {
@@ -84,7 +88,10 @@ pub async fn serve(
         // What a certificate is not of, no browser shows.
         let router = pages(Guard::new(policy, None)).into_make_service();
         let tls = RustlsConfig::from_pem_file(&tls.certificate, &tls.key).await?;
-        let server = axum_server::from_tcp_rustls(listener.into_std()?, tls)?;
+        let mut server =
+            axum_server::from_tcp_rustls(listener.into_std()?, tls)?.first_request_timeout(HEAD_WAIT);
+        // Who says nothing does not keep a connection.
+        server.http_builder().http1().header_read_timeout(HEAD_WAIT);
         tokio::spawn(async move { ended(server.serve(router).await) })
     } else {
         warn!(

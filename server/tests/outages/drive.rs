@@ -42,7 +42,7 @@ impl Server {
 
     fn start(folder: &Path, endpoint: &str) -> Child {
         Command::new(env!("CARGO_BIN_EXE_toponym-server"))
-            .args(["serve", "--listen", endpoint, "--data"])
+            .args(["serve", "--no-http", "--listen", endpoint, "--data"])
             .arg(folder.join("data"))
             .arg("--record")
             .arg(folder.join("run.rec"))
