@@ -4,6 +4,7 @@ use crate::msg::{
     self, Color, Header, MapMetaData, Marker, MarkerArray, OccupancyGrid, PointCloud2, PointField,
     Quaternion, Vector3,
 };
+use toponym::{ClientError, Planner};
 use toponym_proto::Pose;
 use toponym_proto::answer::GraphReply;
 use toponym_proto::regions::RegionsReply;
@@ -54,6 +55,21 @@ pub fn occupancy(
         origin: posed(map_from_grid),
     };
     OccupancyGrid { header: header.clone(), info, data: cells }
+}
+
+/// A map as its server has it now: cells of this edge, and markers.
+///
+/// # Errors
+/// If there is no such map, or no answer in time.
+pub async fn map_as_shown(
+    planner: &Planner,
+    header: &Header,
+    resolution_m: f64,
+) -> Result<(OccupancyGrid, MarkerArray), ClientError> {
+    let grid = planner.grid(resolution_m).await?;
+    let (size, cells) = ((grid.width, grid.height), grid.cells()?);
+    let map = occupancy(header, grid.resolution_m, size, &grid.map_from_grid, cells);
+    Ok((map, markers(header, &planner.regions().await?, &planner.graph().await?)))
 }
 
 /// Points on the floor's level, x and y.

@@ -2,14 +2,14 @@
 
 use super::Shared;
 use super::mouth::Speaker;
-use crate::msg::{Header, MarkerArray, OccupancyGrid, StringMsg, Time};
+use crate::msg::{Header, StringMsg, Time};
 use crate::plan::kind;
-use crate::shown::{markers, occupancy};
+use crate::shown::map_as_shown;
 use crate::wire::Qos;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use tokio::sync::broadcast::error::RecvError;
-use toponym::{ClientError, Guide, Planner};
+use toponym::{Guide, Planner};
 use tracing::debug;
 
 /// How long the server may take to draw.
@@ -41,7 +41,7 @@ async fn draw(shared: &Shared, speaker: &Speaker) -> Result<(), String> {
             continue;
         }
         let began = Instant::now();
-        match pictures(shared, &planner).await {
+        match map_as_shown(&planner, &header(shared), shared.robot.resolution_m).await {
             Ok((map, marked)) => {
                 shown = rev;
                 grid.write(&map).await?;
@@ -52,15 +52,6 @@ async fn draw(shared: &Shared, speaker: &Speaker) -> Result<(), String> {
         }
         next = Instant::now() + interval.max(SHARE * began.elapsed());
     }
-}
-
-async fn pictures(shared: &Shared, planner: &Planner) -> Result<(OccupancyGrid, MarkerArray), ClientError> {
-    let header = header(shared);
-    let grid = planner.grid(shared.robot.resolution_m).await?;
-    let size = (grid.width, grid.height);
-    let grid = occupancy(&header, grid.resolution_m, size, &grid.map_from_grid, grid.cells()?);
-    let (regions, graph) = (planner.regions().await?, planner.graph().await?);
-    Ok((grid, markers(&header, &regions, &graph)))
 }
 
 fn header(shared: &Shared) -> Header {

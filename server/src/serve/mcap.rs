@@ -18,7 +18,7 @@ use toponym_ros::msg::{
     Header, MarkerArray, OccupancyGrid, StringMsg, TFMessage, Time, Transform, TransformStamped,
 };
 use toponym_ros::plan::kind;
-use toponym_ros::shown::{markers, occupancy, posed};
+use toponym_ros::shown::{map_as_shown, posed};
 use tracing::{debug, error, info, warn};
 use zenoh::Session;
 
@@ -154,10 +154,7 @@ async fn draw(session: &Session, board: &Board, sender: &SyncSender<Line>) {
 async fn picture(session: &Session, site: &str, map: &str) -> Result<Line, ClientError> {
     let planner = Planner::new(session, site, map, DRAW_WAIT)?;
     let header = Header { stamp: Time::from(now_ns()), frame_id: frame(map) };
-    let grid = planner.grid(RESOLUTION_M).await?;
-    let (size, cells) = ((grid.width, grid.height), grid.cells()?);
-    let grid = occupancy(&header, grid.resolution_m, size, &grid.map_from_grid, cells);
-    let marked = markers(&header, &planner.regions().await?, &planner.graph().await?);
+    let (grid, marked) = map_as_shown(&planner, &header, RESOLUTION_M).await?;
     Ok(Line::Map { id: map.to_owned(), grid: Box::new(grid), marked: Box::new(marked) })
 }
 

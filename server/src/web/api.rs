@@ -51,16 +51,6 @@ fn selected(web: &Web, uri: &Uri) -> (String, String) {
     (key, uri.query().unwrap_or_default().replace('&', ";").replace('+', "%20"))
 }
 
-/// A question.
-pub async fn ask(State(web): State<Arc<Web>>, uri: Uri) -> Response {
-    answer(web, uri).await
-}
-
-/// A command.
-pub async fn command(State(web): State<Arc<Web>>, uri: Uri) -> Response {
-    answer(web, uri).await
-}
-
 /// What was said of a map: id, text, stamp, and whether it still stands.
 pub async fn sentences(
     State(web): State<Arc<Web>>,
@@ -81,7 +71,8 @@ pub async fn sentences(
     Json(json!({"v": ANSWER_VERSION, "map": view.identity(&snapshot), "sentences": all})).into_response()
 }
 
-async fn answer(web: Arc<Web>, uri: Uri) -> Response {
+/// A question, or a command.
+pub async fn answer(State(web): State<Arc<Web>>, uri: Uri) -> Response {
     let (key, arguments) = selected(&web, &uri);
     let Some(permit) = web.permits.take(&key) else {
         web.board.reach("queries");
