@@ -7,7 +7,7 @@ use std::fmt::Write as _;
 const RULE: &str = "================================================================================";
 
 /// Fields by type; those of other types are named in full.
-const DEFINITIONS: [(&str, &str); 23] = [
+const DEFINITIONS: [(&str, &str); 25] = [
     ("builtin_interfaces/Duration", "int32 sec\nuint32 nanosec\n"),
     ("builtin_interfaces/Time", "int32 sec\nuint32 nanosec\n"),
     ("geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"),
@@ -52,15 +52,12 @@ const DEFINITIONS: [(&str, &str); 23] = [
          string mesh_resource\nvisualization_msgs/MeshFile mesh_file\nbool mesh_use_embedded_materials\n",
     ),
     ("visualization_msgs/MarkerArray", "visualization_msgs/Marker[] markers\n"),
-];
-/// The last of them, which are one of a kind.
-const OF_MARKERS: [(&str, &str); 2] = [
     ("visualization_msgs/MeshFile", "string filename\nuint8[] data\n"),
     ("visualization_msgs/UVCoordinate", "float32 u\nfloat32 v\n"),
 ];
 
 fn fields(name: &str) -> Option<&'static str> {
-    DEFINITIONS.iter().chain(&OF_MARKERS).find(|(known, _)| *known == name).map(|(_, fields)| *fields)
+    DEFINITIONS.iter().find(|(known, _)| *known == name).map(|(_, fields)| *fields)
 }
 
 /// The definition of a type such as `nav_msgs/msg/Path` with those of all its parts, as `ros2msg` has it; none of

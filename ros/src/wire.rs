@@ -4,13 +4,11 @@
 
 use crate::plan::kind;
 
-/// Hash of Humble, which has none.
-pub const NO_HASH: &str = "TypeHashNotSupported";
 /// Length of an attachment, bytes.
 const ATTACHED: usize = 33;
 
 /// Types that are written, or asked for, with their hashes: RIHS01 of Iron to Lyrical.
-const HASHES: [(&str, &str); 9] = [
+const HASHES: [(&str, &str); 10] = [
     (kind::SCAN, "64c191398013af96509d518dac71d5164f9382553fce5c1f8cca5be7924bd828"),
     (kind::TF, "e369d0f05a23ae52508854b66f6aa0437f3449d652e8cbf22d5abe85d020f087"),
     (kind::TEXT, "df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"),
@@ -20,17 +18,14 @@ const HASHES: [(&str, &str); 9] = [
     (kind::POSE_WITH_COVARIANCE, "26432f9803e43727d3c8f668d1fdb3c630f548af631e2f4e31382371bfea3b6e"),
     (kind::MARKERS, "86cb8800b6fb05b5eff1abd7a56f62a5641d3ae9a1c29e78e67e704f1d067dcf"),
     (kind::TRIGGER, "eeff2cd6fa5ad9d27cdf4dec64818317839b62f212a91e6b5304b634b2062c5f"),
+    // Of `deploy/ros2/toponym_msgs`.
+    (kind::WHERE, "d2dad0d1cf557e073cbe3b03b141e00fbc6be087cb45b7a722fd69ff1deba728"),
 ];
-/// Of `deploy/ros2/toponym_msgs`.
-const WHERE_HASH: &str = "d2dad0d1cf557e073cbe3b03b141e00fbc6be087cb45b7a722fd69ff1deba728";
 
 /// The hash of a type as it stands in keys; a `*` for one that is only read.
 pub fn hash(kind: &str) -> String {
-    let known = HASHES.iter().find(|(name, _)| *name == kind).map(|(_, hash)| *hash);
-    match known.or((kind == kind::WHERE).then_some(WHERE_HASH)) {
-        Some(hash) => format!("RIHS01_{hash}"),
-        None => "*".into(),
-    }
+    let known = HASHES.iter().find(|(name, _)| *name == kind);
+    known.map_or_else(|| "*".into(), |(_, hash)| format!("RIHS01_{hash}"))
 }
 
 /// `sensor_msgs/msg/LaserScan` is `sensor_msgs::msg::dds_::LaserScan_`.

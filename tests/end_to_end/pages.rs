@@ -312,6 +312,7 @@ async fn users_do_on_pages_what_their_role_may() {
     for (name, role) in [("anna", Role::Guide), ("vera", Role::Viewer), ("otto", Role::Operator)] {
         policy.users.insert(name.into(), user(role));
     }
+    policy.users.insert("gina".into(), User { robots: vec!["r2".into()], ..user(Role::Guide) });
     let (server, host, _folder) = start(Some(policy)).await;
     let ask = async |request: Request, who: Option<&str>| {
         let request = match who {
@@ -341,5 +342,13 @@ async fn users_do_on_pages_what_their_role_may() {
             assert_eq!(ask(request, Some(&who)).await != 403, may, "{who} {what}");
         }
     }
+    // A guide of one robot has to do with that alone.
+    let gina = "gina:secret-of-theirs";
+    for (path, may) in
+        [("/robot/r1/out/pose", false), ("/robot/r2/out/pose", true), ("/robot/r1/out/heard", false)]
+    {
+        assert_eq!(ask(request("GET", path), Some(gina)).await != 403, may, "{path}");
+    }
+    assert_eq!(ask(say(), Some(gina)).await, 403);
     server.stop().await.unwrap();
 }

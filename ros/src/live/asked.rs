@@ -119,8 +119,8 @@ impl Desk {
     }
 
     async fn ask(&self, name: &str) -> Result<WhereReply, ClientError> {
-        if let Ok(mut spoken_of) = self.shared.spoken_of.lock() {
-            *spoken_of = Some(name.to_owned());
+        if let Ok(mut asked_for) = self.shared.asked_for.lock() {
+            *asked_for = Some(name.to_owned());
         }
         self.planner.where_is(name).await
     }
@@ -149,8 +149,8 @@ impl Desk {
 
     /// To a question without words: where what was asked for last is, or else where the robot is.
     async fn last(&self) -> TriggerResponse {
-        let spoken_of = self.shared.spoken_of.lock().ok().and_then(|name| name.clone());
-        let Some(name) = spoken_of else {
+        let asked_for = self.shared.asked_for.lock().ok().and_then(|name| name.clone());
+        let Some(name) = asked_for else {
             return match self.planner.what(None).await {
                 Ok(what) => {
                     let names: Vec<String> =

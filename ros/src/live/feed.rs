@@ -27,7 +27,7 @@ pub struct Feed {
     kept_bytes: usize,
     first_ns: Option<i64>,
     stream: Option<(Plan, Stream)>,
-    /// Where to look if there is no plan.
+    /// Why there is no plan yet, if one was tried.
     problem: Option<String>,
 }
 

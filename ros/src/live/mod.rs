@@ -18,7 +18,7 @@ mod session;
 mod take_in;
 
 pub use mouth::{Speaker, Writer};
-pub use session::{now_ns, open};
+pub use session::now_ns;
 
 use crate::plan::Plan;
 use serde::{Deserialize, Serialize};
@@ -174,8 +174,8 @@ struct Shared {
     pose: watch::Sender<Option<PoseOut>>,
     /// When somebody else last told where odometry lies in a map, Unix nanoseconds.
     others_ns: AtomicI64,
-    /// The newest name that was spoken of.
-    spoken_of: Mutex<Option<String>>,
+    /// What was asked for last.
+    asked_for: Mutex<Option<String>>,
     found: Mutex<found::Found>,
 }
 
@@ -220,7 +220,7 @@ async fn bridge(robot: &RosRobot, site: &str, own: &Session, ros: &Session) -> R
         clock: watch::Sender::new(clock::RobotClock::default()),
         pose: watch::Sender::new(None),
         others_ns: AtomicI64::new(0),
-        spoken_of: Mutex::default(),
+        asked_for: Mutex::default(),
         found: Mutex::default(),
     });
     let _poses = watch_poses(&shared).await?;

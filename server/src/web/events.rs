@@ -53,7 +53,12 @@ pub async fn events(
             if event.name == LAST_EVENT {
                 return None;
             }
-            if event.name == "heard" && !who.may_hear(&event.of) {
+            let is_hidden = match event.name {
+                "heard" => !who.may_hear(&event.of),
+                "pose" | "state" => !who.is_about(&event.of),
+                _ => false,
+            };
+            if is_hidden {
                 continue;
             }
             if event.name == "pose" {

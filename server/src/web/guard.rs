@@ -70,14 +70,14 @@ impl Who {
             ["do", _] => is(&[Role::Operator]),
             ["robot", robot, "out", "heard"] => self.may_hear(robot),
             ["map", _, "sentences"] => self.may_hear_some(),
-            ["robot", _, "out", _] | ["map", ..] | ["events"] => {
-                is(&[Role::Guide, Role::Planner, Role::Viewer, Role::Operator])
-            }
+            ["robot", robot, "out", _] => self.is_about(robot) && self.may(method, "/events"),
+            ["map", ..] | ["events"] => is(&[Role::Guide, Role::Planner, Role::Viewer, Role::Operator]),
             _ => matches!(*method, Method::GET | Method::HEAD),
         }
     }
 
-    fn is_about(&self, robot: &str) -> bool {
+    /// Whether a robot is one of those that they have to do with.
+    pub fn is_about(&self, robot: &str) -> bool {
         self.robots.is_empty() || self.robots.iter().any(|own| own == robot)
     }
 

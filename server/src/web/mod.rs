@@ -21,8 +21,8 @@ mod pages;
 mod tiles;
 
 pub use events::{LAST_EVENT, Published};
-pub use guard::Guard;
 
+use self::guard::Guard;
 use crate::access::Policy;
 use crate::config::{DEFAULT_HTTP, ServerConfig};
 use crate::serve::board::Board;
