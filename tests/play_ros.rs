@@ -9,6 +9,7 @@ use toponym_ros::bag::Bag;
 use toponym_ros::cdr;
 use toponym_ros::msg::LaserScan;
 use toponym_ros::plan::{Plan, Survey, kind};
+use toponym_ros::wire::Hashes;
 use toponym_tests::ros_robot::RosRobot;
 
 /// Play a bag over a Zenoh router, as rmw_zenoh would
@@ -38,6 +39,9 @@ struct Args {
     /// Share of scans that get lost
     #[arg(long, default_value_t = 0.0)]
     lose: f64,
+    /// Tell types as Humble does, without hashes
+    #[arg(long)]
+    humble: bool,
     /// Stay for so long afterwards, seconds
     #[arg(long, default_value_t = 5.0)]
     stay: f64,
@@ -74,7 +78,8 @@ async fn main() -> anyhow::Result<()> {
     let (all, plan) = messages(&args)?;
     let Some(first) = all.first() else { bail!("there is nothing in it") };
     let why = |e: zenoh::Error| anyhow::anyhow!("{e}");
-    let mut robot = RosRobot::start(&args.listen, args.domain, &args.namespace).await.map_err(why)?;
+    let hashes = if args.humble { Hashes::None } else { Hashes::OfTypes };
+    let mut robot = RosRobot::start(&args.listen, args.domain, &args.namespace, hashes).await.map_err(why)?;
     println!("a robot at {}; waiting for toponym", robot.endpoint());
     robot.wait_for_toponym().await.map_err(why)?;
     let transforms = robot.transforms(&format!("{}/tf", args.namespace)).await.map_err(why)?;

@@ -8,7 +8,7 @@ use toponym_ros::frames::{isometry, moving, name};
 use toponym_ros::live::{Speaker, Writer};
 use toponym_ros::msg::TFMessage;
 use toponym_ros::plan::kind;
-use toponym_ros::wire::{Qos, key};
+use toponym_ros::wire::{Hashes, Qos, key};
 use zenoh::Session;
 
 /// As tf2 has it.
@@ -31,6 +31,7 @@ pub struct RosRobot {
     /// The node's session, a peer.
     pub node: Session,
     speaker: Speaker,
+    hashes: Hashes,
     domain: u32,
     writers: BTreeMap<(String, String), Writer>,
     /// Each message of it has a publisher of its own, as there are as many nodes.
@@ -43,7 +44,12 @@ impl RosRobot {
     ///
     /// # Errors
     /// Zenoh's.
-    pub async fn start(listen: &str, domain: u32, namespace: &str) -> Result<Self, zenoh::Error> {
+    pub async fn start(
+        listen: &str,
+        domain: u32,
+        namespace: &str,
+        hashes: Hashes,
+    ) -> Result<Self, zenoh::Error> {
         let router = session(&[
             ("mode", "\"router\"".into()),
             ("listen/endpoints", format!("[{listen:?}]")),
@@ -57,8 +63,17 @@ impl RosRobot {
             ("listen/endpoints", "[\"tcp/localhost:0\"]".into()),
         ])
         .await?;
-        let speaker = Speaker::new(&node, domain, namespace).await?;
-        Ok(Self { router, node, speaker, domain, writers: BTreeMap::new(), latched: Vec::new(), endpoint })
+        let speaker = Speaker::new(&node, domain, namespace, hashes).await?;
+        Ok(Self {
+            router,
+            node,
+            speaker,
+            hashes,
+            domain,
+            writers: BTreeMap::new(),
+            latched: Vec::new(),
+            endpoint,
+        })
     }
 
     /// Where the router listens.
@@ -66,18 +81,22 @@ impl RosRobot {
         &self.endpoint
     }
 
-    /// Waits until toponym is seen, and with it its subscriptions.
+    /// Waits until toponym is seen, and with it its subscriptions; and until it tells types as this robot does.
     ///
     /// # Errors
     /// Zenoh's.
-    pub async fn wait_for_toponym(&self) -> Result<(), zenoh::Error> {
+    pub async fn wait_for_toponym(&mut self) -> Result<(), zenoh::Error> {
         let (tokens, own) = (format!("@ros2_lv/{}/**", self.domain), self.node.zid().to_string());
         let seen = self.node.liveliness().declare_subscriber(tokens).history(true).await?;
         loop {
             let token = seen.recv_async().await?.key_expr().to_string();
             // Its services come last.
             if token.contains("/SS/") && token.contains("where_is") && !token.contains(&own) {
-                return Ok(());
+                if Hashes::in_key(&token) == self.hashes {
+                    return Ok(());
+                }
+                // It hears how this one speaks.
+                self.write("/tf", kind::TF, &TFMessage::default()).await?;
             }
         }
     }

@@ -2,11 +2,13 @@
 
 use crate::session::{ClientError, ask};
 use std::time::Duration;
-use toponym_proto::Mend;
-use toponym_proto::answer::{Done, GraphReply, GridReply, Info, LabelsReply, Mended, WhatReply, WhereReply};
+use toponym_proto::answer::{
+    Done, GraphReply, GridReply, Info, LabelsReply, Mended, Sent, WhatReply, WhereReply,
+};
 use toponym_proto::keys::{Ask, Keys, check_id};
 use toponym_proto::regions::RegionsReply;
 use toponym_proto::selector;
+use toponym_proto::{Mend, Pose};
 use zenoh::Session;
 
 /// Asks one map of one site.
@@ -88,6 +90,14 @@ impl Planner {
         ask(&self.session, &self.keys.ask(&self.map, Ask::Regions), "", self.timeout).await
     }
 
+    /// Sends the map's robot to where something is, through whatever drives it and hears [`Keys::goal`]. Nothing is sent, and
+    /// no goal is told, where that is rather nowhere or can't be reached; refused where the robot is lost.
+    pub async fn go(&self, name: &str, lang: Option<&str>) -> Result<Sent, ClientError> {
+        let arguments = [Some(("map", self.map.as_str())), Some(("name", name)), lang.map(|l| ("lang", l))];
+        let arguments = selector::encode(arguments.into_iter().flatten());
+        ask(&self.session, &self.keys.command("go"), &arguments, self.timeout).await
+    }
+
     /// Deletes the map; the server keeps its folder aside. Its robot has to present itself again.
     pub async fn delete(&self) -> Result<Done, ClientError> {
         let arguments = selector::encode([("map", self.map.as_str())]);
@@ -102,15 +112,26 @@ impl Planner {
     }
 
     /// Mends what was said: takes a sentence back, as if it had never been said; gives a name its right
-    /// spelling; forgets a name. Refused where there is nothing of the kind.
+    /// spelling; forgets a name; takes in where somebody sees the robot. Refused where there is nothing of the kind.
     pub async fn mend(&self, mend: &Mend) -> Result<Mended, ClientError> {
         let (command, mut arguments) = match mend {
-            Mend::Undo { id } => ("undo", id.iter().map(|id| ("id", id.as_str())).collect()),
-            Mend::Rename { from, to } => ("rename", vec![("from", from.as_str()), ("to", to)]),
-            Mend::Forget { name } => ("forget", vec![("name", name.as_str())]),
+            Mend::Undo { id } => ("undo", id.iter().map(|id| ("id", id.clone())).collect()),
+            Mend::Rename { from, to } => ("rename", vec![("from", from.clone()), ("to", to.clone())]),
+            Mend::Forget { name } => ("forget", vec![("name", name.clone())]),
+            Mend::Pose { id, map_from_body: Pose { x_m, y_m, yaw_rad }, sigma_m, sigma_rad } => {
+                let numbers = [
+                    ("x_m", x_m),
+                    ("y_m", y_m),
+                    ("yaw_rad", yaw_rad),
+                    ("sigma_m", sigma_m),
+                    ("sigma_rad", sigma_rad),
+                ];
+                let numbers = numbers.into_iter().map(|(name, value)| (name, value.to_string()));
+                ("initial_pose", numbers.chain([("id", id.clone())]).collect())
+            }
         };
-        arguments.push(("map", &self.map));
-        let arguments = selector::encode(arguments);
+        arguments.push(("map", self.map.clone()));
+        let arguments = selector::encode(arguments.iter().map(|(name, value)| (*name, value.as_str())));
         ask(&self.session, &self.keys.command(command), &arguments, self.timeout).await
     }
 

@@ -6,12 +6,6 @@ use toponym_proto::answer::{Candidate, WhereReply};
 /// Less likely alternatives are left out.
 const SHOWN_MIN: f64 = 0.005;
 
-/// Whether something is rather somewhere than nowhere.
-pub fn is_found(reply: &WhereReply) -> bool {
-    let likeliest = reply.candidates.iter().map(|c| c.probability).fold(0.0, f64::max);
-    likeliest > 0.0 && likeliest >= reply.p_none
-}
-
 /// Where something is, likeliest first, a line each.
 pub fn where_text(reply: &WhereReply) -> String {
     let Some((best, others)) = reply.candidates.split_first() else {

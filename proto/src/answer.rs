@@ -119,6 +119,29 @@ pub struct Goal {
     pub reachable: Reachable,
 }
 
+/// Answer of `do/go`; with a goal it is published on the robot's `out/goal`, for whatever drives it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sent {
+    /// [`ANSWER_VERSION`].
+    pub v: u32,
+    /// `go`.
+    pub query: String,
+    /// Which robot.
+    pub robot: String,
+    /// In which map the goal stands.
+    pub map: MapIdentity,
+    /// Stamp of the newest message in that map.
+    pub stamp: Stamp,
+    /// What it was sent to, as a guide spells it.
+    pub name: String,
+    /// Where that is; none where it is rather nowhere, or nobody can get there: then nothing is published.
+    pub goal: Option<Goal>,
+    /// Probability that this is the one meant.
+    pub probability: f64,
+    /// For people.
+    pub words: String,
+}
+
 /// Whether there is a way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
@@ -222,6 +245,14 @@ pub struct Edge {
 pub struct ErrorReply {
     /// What went wrong.
     pub error: Problem,
+}
+
+impl WhereReply {
+    /// Whether it is rather somewhere than nowhere.
+    pub fn is_found(&self) -> bool {
+        let likeliest = self.candidates.iter().map(|c| c.probability).fold(0.0, f64::max);
+        likeliest > 0.0 && likeliest >= self.p_none
+    }
 }
 
 /// What went wrong, and what to do.

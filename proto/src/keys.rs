@@ -118,6 +118,10 @@ impl Keys {
     pub fn heard(&self, robot: &str) -> String {
         self.robot(robot, "out/heard")
     }
+    /// Where a robot is sent, [`crate::answer::Sent`].
+    pub fn goal(&self, robot: &str) -> String {
+        self.robot(robot, "out/goal")
+    }
     /// A robot's [`crate::answer::Ack`].
     pub fn ack(&self, robot: &str) -> String {
         self.robot(robot, "out/ack")

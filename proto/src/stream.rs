@@ -188,8 +188,8 @@ pub struct Hearing {
     pub p: f64,
 }
 
-/// What an operator mends at a desk, by the queries `do/undo`, `do/rename` and `do/forget`.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// What an operator mends at a desk, by the queries `do/undo`, `do/rename`, `do/forget` and `do/initial_pose`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mend {
     /// Takes a sentence back.
@@ -208,6 +208,17 @@ pub enum Mend {
     Forget {
         /// The name.
         name: String,
+    },
+    /// The robot is there, as somebody sees it.
+    Pose {
+        /// ULID; makes a resend harmless, and lets it be taken back.
+        id: String,
+        /// Of the body.
+        map_from_body: Pose,
+        /// Standard deviation in each direction.
+        sigma_m: f64,
+        /// Standard deviation of the heading.
+        sigma_rad: f64,
     },
 }
 

@@ -5,6 +5,12 @@ use crate::limits::{
     TIME_INCREMENT_MAX_S,
 };
 use crate::stream::{Header, Laser, Mend, Message, Pose, Say, Scan, Setup, Stamp};
+use std::f64::consts::PI;
+
+/// Nobody points at where a robot is more exactly, metres or radians, …
+const SIGMA_MIN: f64 = 0.01;
+/// … or says anything by less.
+const SIGMA_MAX_M: f64 = 1000.0;
 
 /// Stands for "the one robot there is" in the key of a sentence; no robot may bear it.
 pub const ANY_ROBOT: &str = "any";
@@ -177,6 +183,12 @@ fn check_mend(mend: &Mend, limits: &Limits) -> Result<(), Invalid> {
             check_text("to", to, limits)
         }
         Mend::Forget { name } => check_text("name", name, limits),
+        Mend::Pose { id, map_from_body, sigma_m, sigma_rad } => {
+            check_token("id", id)?;
+            check_pose("map_from_body", map_from_body)?;
+            check_number("sigma_m", *sigma_m, SIGMA_MIN, SIGMA_MAX_M)?;
+            check_number("sigma_rad", *sigma_rad, SIGMA_MIN, PI)
+        }
     }
 }
 

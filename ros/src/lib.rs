@@ -23,6 +23,7 @@ pub mod live;
 pub mod log;
 pub mod msg;
 pub mod plan;
+pub mod robot;
 pub mod shown;
 pub mod stream;
 pub mod wire;

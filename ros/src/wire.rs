@@ -22,10 +22,34 @@ const HASHES: [(&str, &str); 10] = [
     (kind::WHERE, "d2dad0d1cf557e073cbe3b03b141e00fbc6be087cb45b7a722fd69ff1deba728"),
 ];
 
-/// The hash of a type as it stands in keys; a `*` for one that is only read.
-pub fn hash(kind: &str) -> String {
-    let known = HASHES.iter().find(|(name, _)| *name == kind);
-    known.map_or_else(|| "*".into(), |(_, hash)| format!("RIHS01_{hash}"))
+/// What Humble writes in place of each.
+const NO_HASH: &str = "TypeHashNotSupported";
+
+/// Whether keys tell types by hashes: who does and who does not never meet, and neither is told.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Hashes {
+    /// Iron to Lyrical.
+    #[default]
+    OfTypes,
+    /// Humble.
+    None,
+}
+
+impl Hashes {
+    /// The hash of a type as it stands in keys; a `*` for one that is only read.
+    pub fn of(self, kind: &str) -> String {
+        let known = HASHES.iter().find(|(name, _)| *name == kind);
+        match (self, known) {
+            (Self::None, _) => NO_HASH.into(),
+            (Self::OfTypes, Some((_, hash))) => format!("RIHS01_{hash}"),
+            (Self::OfTypes, None) => "*".into(),
+        }
+    }
+
+    /// Which a key has.
+    pub fn in_key(key: &str) -> Self {
+        if key.split('/').any(|chunk| chunk == NO_HASH) { Self::None } else { Self::OfTypes }
+    }
 }
 
 /// `sensor_msgs/msg/LaserScan` is `sensor_msgs::msg::dds_::LaserScan_`.
@@ -104,6 +128,8 @@ impl Qos {
 pub struct Node {
     /// `ROS_DOMAIN_ID`
     pub domain: u32,
+    /// As the robot has it.
+    pub hashes: Hashes,
     /// Of its session, as Zenoh prints it.
     pub zid: String,
     /// One counter for nodes and what they have.
@@ -121,7 +147,7 @@ fn mangled(name: &str) -> String {
 
 impl Node {
     fn token_of(&self, id: u32, role: &str) -> String {
-        let Self { domain, zid, id: own, namespace, name } = self;
+        let Self { domain, zid, id: own, namespace, name, .. } = self;
         format!("@ros2_lv/{domain}/{zid}/{own}/{id}/{role}/%/{}/{name}", mangled(namespace))
     }
 
@@ -132,7 +158,7 @@ impl Node {
 
     /// The token of what it has, by its number.
     pub fn token_of_entity(&self, id: u32, role: Role, name: &str, kind: &str, qos: Qos) -> String {
-        let (name, dds, hash, qos) = (mangled(name), dds_type(kind), hash(kind), qos.text());
+        let (name, dds, hash, qos) = (mangled(name), dds_type(kind), self.hashes.of(kind), qos.text());
         format!("{}/{name}/{dds}/{hash}/{qos}", self.token_of(id, role.text()))
     }
 }
@@ -208,7 +234,7 @@ mod tests {
 
     #[test]
     fn topics_are_found_in_their_keys() {
-        let key = key(7, "/r1/front/scan", kind::SCAN, &hash(kind::SCAN));
+        let key = key(7, "/r1/front/scan", kind::SCAN, &Hashes::OfTypes.of(kind::SCAN));
         assert!(key.starts_with("7/r1/front/scan/sensor_msgs::msg::dds_::LaserScan_/RIHS01_64c1"), "{key}");
         let told = Some(("/r1/front/scan".to_owned(), kind::SCAN.to_owned()));
         assert_eq!(topic_of(&key), told);
@@ -220,8 +246,14 @@ mod tests {
 
     #[test]
     fn tokens_and_attachments_are_read_back() {
-        let node =
-            Node { domain: 3, zid: "ab".into(), id: 2, namespace: "/r1".into(), name: "toponym".into() };
+        let node = Node {
+            domain: 3,
+            hashes: Hashes::OfTypes,
+            zid: "ab".into(),
+            id: 2,
+            namespace: "/r1".into(),
+            name: "toponym".into(),
+        };
         let token = node.token_of_entity(9, Role::Publisher, "/r1/map", kind::GRID, Qos::Latched);
         let told = publisher_of(&token).unwrap();
         assert_eq!((told.domain, told.node.as_str(), told.topic.as_str()), (3, "/r1/toponym", "/r1/map"));

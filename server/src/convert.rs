@@ -61,6 +61,10 @@ pub fn event(message: Message) -> Event {
             Mend::Undo { id } => event::Command::Undo { utterance: id },
             Mend::Rename { from, to } => event::Command::Rename { from, to },
             Mend::Forget { name } => event::Command::Forget { name },
+            Mend::Pose { id, map_from_body, sigma_m, sigma_rad } => {
+                let map_from_body = pose_in(&map_from_body);
+                event::Command::Pose(event::Told { id, map_from_body, sigma_m, sigma_rad })
+            }
         }),
     }
 }

@@ -3,12 +3,12 @@
 use crate::site::{Folder, Site, drive, recorded, saved_map, say, settings};
 use toponym_core::Mapper;
 use toponym_proto::answer::{
-    Clocks, ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, Reachable,
+    Clocks, ErrorCode, GraphReply, GridReply, Info, LabelsReply, Mended, PoseOut, PoseState, Reachable, Sent,
     WhatReply, WhereReply,
 };
 use toponym_proto::keys::Ask;
 use toponym_proto::regions::RegionsReply;
-use toponym_proto::{Header, Message};
+use toponym_proto::{Header, Message, Pose};
 use toponym_server::convert;
 
 async fn mapped(folder: &Folder) -> Site {
@@ -58,6 +58,32 @@ async fn a_map_answers() {
     for wrong in
         [ask(Ask::What, "x_m=1"), ask(Ask::What, "x_m=a;y_m=2"), ask(Ask::Where, "text=of%20the%20of")]
     {
+        assert_eq!(site.ask(&wrong, "").await.unwrap_err().code, ErrorCode::BadArgument, "{wrong}");
+    }
+
+    // It can be sent there, and whatever drives it hears of it.
+    let goals = site.listen(site.keys.goal("r1")).await;
+    let go = |arguments: &str| format!("{}?{arguments}", site.keys.command("go"));
+    let sent: Sent = serde_json::from_value(site.ask(&go("name=gym"), "").await.unwrap()).unwrap();
+    assert_eq!((sent.robot.as_str(), &sent.goal), ("r1", &best.goal), "{sent:?}");
+    goals.until(|told: &Sent| *told == sent).await;
+    let json = site.ask(&go("name=swimming%20pool;robot=r1"), "").await.unwrap();
+    assert_eq!(serde_json::from_value::<Sent>(json).unwrap().goal, None);
+    assert_eq!(site.ask(&go("name=gym;robot=r9"), "").await.unwrap_err().code, ErrorCode::NoSuchRobot);
+
+    // Somebody sees it where it is, and somewhere else.
+    let told = |arguments: &str| format!("{}?{arguments}", site.keys.command("initial_pose"));
+    let pose: PoseOut = serde_json::from_value(site.ask(&site.keys.pose("r1"), "").await.unwrap()).unwrap();
+    let Pose { x_m, y_m, yaw_rad } = pose.map_from_body;
+    for (x_m, words) in [(x_m, "too."), (x_m + 30.0, "I look for it there.")] {
+        let there = told(&format!("x_m={x_m};y_m={y_m};yaw_rad={yaw_rad}"));
+        let mended: Mended = serde_json::from_value(site.ask(&there, "").await.unwrap()).unwrap();
+        assert!(mended.words.ends_with(words), "{mended:?}");
+    }
+    let json = site.ask(&site.keys.command("undo"), "").await.unwrap();
+    let mended: Mended = serde_json::from_value(json).unwrap();
+    assert!(mended.words.starts_with("I took back: \"the robot is at x 3"), "{mended:?}");
+    for wrong in [told("x_m=1"), told("x_m=1;y_m=2;yaw_rad=north"), told("x_m=1;y_m=2;yaw_rad=0;sigma_m=0")] {
         assert_eq!(site.ask(&wrong, "").await.unwrap_err().code, ErrorCode::BadArgument, "{wrong}");
     }
 

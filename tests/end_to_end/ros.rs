@@ -10,11 +10,12 @@ use toponym_ros::bag::Bag;
 use toponym_ros::cdr;
 use toponym_ros::live::RosRobot as Settings;
 use toponym_ros::msg::{
-    Header, LaserScan, MarkerArray, OccupancyGrid, PoseStamped, Quaternion, StringMsg, TFMessage, Time,
-    Transform, TransformStamped, TriggerResponse, Vector3, WhereRequest, WhereResponse,
+    Header, MarkerArray, OccupancyGrid, PoseStamped, PoseWithCovarianceStamped, Quaternion, StringMsg,
+    TFMessage, Time, Transform, TransformStamped, TriggerResponse, Vector3, WhereRequest, WhereResponse,
 };
 use toponym_ros::plan::kind;
-use toponym_ros::wire::{attached, attachment, hash, key};
+use toponym_ros::robot::{AsRos, Published};
+use toponym_ros::wire::{Hashes, attached, attachment, key};
 use toponym_tests::ros_robot::RosRobot;
 use zenoh::query::QueryTarget;
 use zenoh_ext::{AdvancedSubscriberBuilderExt, HistoryConfig};
@@ -32,36 +33,17 @@ fn transform(stamp: Stamp, parent: &str, child: &str, x: f64, yaw_rad: f64) -> T
     TFMessage { transforms: vec![TransformStamped { header, child_frame_id: child.into(), transform }] }
 }
 
-/// A message of a robot as a ROS robot sends it, its topics behind `space`.
-async fn send(robot: &mut RosRobot, space: &str, message: &Message) {
-    let topic = |name: &str| format!("{space}{name}");
-    let sent = match message {
-        Message::Setup(m) => {
-            let mounted = transform(m.header.stamp, "base_link", "laser", 0.0, TURNED_RAD);
-            robot.write(&topic("/tf_static"), kind::TF, &mounted).await
-        }
-        Message::Odom(m) => {
-            let pose = transform(m.header.stamp, "odom", "base_link", m.odom_from_body.x_m, 0.0);
-            robot.write(&topic("/tf"), kind::TF, &pose).await
-        }
-        Message::Scan(m) => {
-            let scan = LaserScan {
-                header: Header { stamp: Time::from(m.header.stamp.ns), frame_id: "laser".into() },
-                angle_min: (m.angle_min_rad - TURNED_RAD) as f32,
-                angle_increment: m.angle_increment_rad as f32,
-                range_min: 0.05,
-                range_max: 30.0,
-                ranges: m.ranges_m.clone(),
-                ..LaserScan::default()
-            };
-            robot.write(&topic("/scan"), kind::SCAN, &scan).await
-        }
-        Message::Say(m) => {
-            robot.write(&topic("/speech"), kind::TEXT, &StringMsg { data: m.text.clone() }).await
-        }
-        Message::End(_) | Message::Mend(_) => Ok(()),
-    };
-    sent.unwrap();
+/// A message of a robot as a ROS robot sends it, its topics behind `space`, its laser turned.
+async fn send(robot: &mut RosRobot, as_ros: &mut AsRos, space: &str, message: &Message) {
+    let mut turned = message.clone();
+    match &mut turned {
+        Message::Setup(m) => m.lasers.iter_mut().for_each(|laser| laser.yaw_rad = TURNED_RAD),
+        Message::Scan(m) => m.angle_min_rad -= TURNED_RAD,
+        _ => {}
+    }
+    if let Some(Published { topic, kind, data }) = as_ros.of(&turned).unwrap() {
+        robot.publish(&format!("{space}{topic}"), kind, data).await.unwrap();
+    }
 }
 
 /// A robot, a server that maps for it, and the last stamp that the robot sent.
@@ -72,12 +54,16 @@ struct Scene {
     folder: Folder,
 }
 
+fn hash(kind: &str) -> String {
+    Hashes::OfTypes.of(kind)
+}
+
 /// The drive through the hall, sent by a robot in this namespace and domain; the mounting before the server was there.
-async fn scene(space: &str, domain: u32) -> Scene {
+async fn scene(space: &str, domain: u32, hashes: Hashes) -> Scene {
     let folder = Folder::new();
-    let mut robot = RosRobot::start("tcp/127.0.0.1:0", domain, space).await.unwrap();
-    let drive = drive("r1", "main");
-    send(&mut robot, space, &drive[0]).await;
+    let mut robot = RosRobot::start("tcp/127.0.0.1:0", domain, space, hashes).await.unwrap();
+    let (drive, mut as_ros) = (drive("r1", "main"), AsRos::default());
+    send(&mut robot, &mut as_ros, space, &drive[0]).await;
     let mut config = settings(&folder);
     config.mcap = Some(folder.0.join("tour.mcap"));
     config.ros.push(Settings {
@@ -91,7 +77,7 @@ async fn scene(space: &str, domain: u32) -> Scene {
     let site = Site::start(config).await;
     timeout(PATIENCE, robot.wait_for_toponym()).await.unwrap().unwrap();
     for message in &drive[1..] {
-        send(&mut robot, space, message).await;
+        send(&mut robot, &mut as_ros, space, message).await;
     }
     let last = Stamp { ns: drive[80].header().unwrap().stamp.ns };
     Scene { robot, site, last, folder }
@@ -136,8 +122,10 @@ impl Scene {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn a_ros_robot_is_mapped_and_told_where_it_is() {
-    for (space, domain) in [("", 0), ("/r1", 7)] {
-        let mut scene = scene(space, domain).await;
+    for (space, domain, hashes) in
+        [("", 0, Hashes::OfTypes), ("/r1", 7, Hashes::OfTypes), ("", 0, Hashes::None)]
+    {
+        let mut scene = scene(space, domain, hashes).await;
         let transforms = scene.robot.transforms(&format!("{space}/tf")).await.unwrap();
         // All 40 scans are in the map, where they were made.
         let pose = scene
@@ -166,7 +154,7 @@ async fn a_ros_robot_is_mapped_and_told_where_it_is() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn whoever_comes_late_sees_map_and_markers() {
-    let mut scene = scene("", 0).await;
+    let mut scene = scene("", 0, Hashes::OfTypes).await;
     scene.until("", async |site| Scene::pose(site).await).await;
     let mut latched = Vec::new();
     for (topic, of) in [("/map", kind::GRID), ("/toponym/markers", kind::MARKERS)] {
@@ -199,7 +187,7 @@ async fn whoever_comes_late_sees_map_and_markers() {
 
 #[tokio::test(flavor = "multi_thread")]
 async fn what_is_said_and_asked_by_ros_is_heard_and_answered() {
-    let mut scene = scene("", 0).await;
+    let mut scene = scene("", 0, Hashes::OfTypes).await;
     scene.until("", async |site| Scene::pose(site).await.filter(|p| p.stamp.ns >= 5_000_000_000)).await;
     let text = |topic: &str| key(0, topic, kind::TEXT, &hash(kind::TEXT));
     let heard = scene.robot.node.declare_subscriber(text("/toponym/heard")).await.unwrap();
@@ -210,7 +198,7 @@ async fn what_is_said_and_asked_by_ros_is_heard_and_answered() {
         .await
         .unwrap();
     let say = toponym_proto::Say { text: "this is the gym".into(), ..toponym_proto::Say::default() };
-    send(&mut scene.robot, "", &Message::Say(say)).await;
+    send(&mut scene.robot, &mut AsRos::default(), "", &Message::Say(say)).await;
     scene.until("", async |_| heard.try_recv().ok().flatten()).await;
     // By a type of our own.
     let service = key(0, "/toponym/where_is", kind::WHERE, &hash(kind::WHERE));
@@ -253,12 +241,21 @@ async fn what_is_said_and_asked_by_ros_is_heard_and_answered() {
     let goal = timeout(PATIENCE, goals.recv_async()).await.unwrap().unwrap();
     let goal: PoseStamped = cdr::read(&goal.payload().to_bytes()).unwrap();
     assert_eq!(goal.header.frame_id, "map");
+    // Where it is, as RViz tells it.
+    let answers = scene.robot.node.declare_subscriber(text("/toponym/answer")).await.unwrap();
+    let mut told = PoseWithCovarianceStamped::default();
+    told.header.frame_id = "map".into();
+    (told.pose.pose.position.x, told.pose.pose.orientation.w) = (7.8, 1.0);
+    scene.robot.write("/initialpose", kind::POSE_WITH_COVARIANCE, &told).await.unwrap();
+    let answer = timeout(PATIENCE, answers.recv_async()).await.unwrap().unwrap();
+    let StringMsg { data } = cdr::read(&answer.payload().to_bytes()).unwrap();
+    assert!(data.starts_with("The map has the robot ") && data.ends_with("too."), "{data}");
     scene.stop().await;
 }
 
 #[tokio::test(flavor = "multi_thread")]
 async fn who_tells_map_to_odom_already_is_not_talked_over() {
-    let mut scene = scene("", 0).await;
+    let mut scene = scene("", 0, Hashes::OfTypes).await;
     let transforms = scene.robot.transforms("/tf").await.unwrap();
     let stamp_ns = scene.last.ns + 1_000_000_000;
     scene.until("", async |_| transforms.look_up("map", "odom", stamp_ns)).await;

@@ -37,6 +37,14 @@ impl<W: Write + Seek> BagWriter<W> {
         at_ns: i64,
         message: &T,
     ) -> Result<(), String> {
+        self.put(topic, kind, at_ns, &cdr::write(message)?)
+    }
+
+    /// The same of a message that is CDR already.
+    ///
+    /// # Errors
+    /// As [`BagWriter::write`].
+    pub fn put(&mut self, topic: &str, kind: &str, at_ns: i64, data: &[u8]) -> Result<(), String> {
         let why = |e: mcap::McapError| e.to_string();
         if !self.channels.contains_key(topic) {
             let definition = definition(kind).ok_or_else(|| format!("{kind} is not written"))?;
@@ -53,7 +61,7 @@ impl<W: Write + Seek> BagWriter<W> {
             log_time: time,
             publish_time: time,
         };
-        self.file.write_to_known_channel(&header, &cdr::write(message)?).map_err(why)
+        self.file.write_to_known_channel(&header, data).map_err(why)
     }
 
     /// What is written so far can be read from now on, whatever happens.

@@ -4,18 +4,23 @@ use super::broadcast::goal;
 use super::mouth::{Asked, Speaker, Writer};
 use super::{Failure, Shared};
 use crate::cdr;
-use crate::msg::{PoseStamped, StringMsg, TriggerResponse, WhereRequest, WhereResponse};
+use crate::frames::{isometry, on_floor};
+use crate::msg::{
+    PoseStamped, PoseWithCovariance, PoseWithCovarianceStamped, StringMsg, Transform, TriggerResponse,
+    WhereRequest, WhereResponse,
+};
 use crate::plan::kind;
 use crate::wire::{self, Qos};
 use std::sync::Arc;
 use std::time::Duration;
 use tokio::runtime::Handle;
 use tokio::sync::Semaphore;
-use toponym::told::{is_found, where_text};
+use toponym::guide::sentence;
+use toponym::told::where_text;
 use toponym::{ClientError, Planner};
-use toponym_proto::Pose;
 use toponym_proto::answer::WhereReply;
-use tracing::warn;
+use toponym_proto::{Mend, Pose};
+use tracing::{info, warn};
 use zenoh::Session;
 use zenoh::sample::Locality;
 
@@ -33,7 +38,6 @@ struct Desk {
     permits: Arc<Semaphore>,
     answers: Writer,
     answer_poses: Writer,
-    goals: Writer,
 }
 
 /// From now on, until the session closes.
@@ -48,7 +52,6 @@ pub async fn answer_all(shared: &Arc<Shared>, ros: &Session, speaker: &Speaker) 
         permits: Arc::new(Semaphore::new(AT_A_TIME)),
         answers: topic("/toponym/answer", kind::TEXT).await?,
         answer_poses: topic("/toponym/answer_pose", kind::POSE).await?,
-        goals: topic("/goal_pose", kind::POSE).await?,
     });
     for (name, go) in [("/toponym/ask", false), ("/toponym/go", true)] {
         let (name, desk) = (speaker.named(name), desk.clone());
@@ -57,12 +60,25 @@ pub async fn answer_all(shared: &Arc<Shared>, ros: &Session, speaker: &Speaker) 
             .allowed_origin(Locality::Remote)
             .callback(move |sample| {
                 if let Ok(StringMsg { data }) = cdr::read(&sample.payload().to_bytes()) {
-                    desk.clone().work(move |desk| async move { desk.tell(&data, go).await });
+                    desk.clone().work(move |desk| async move {
+                        if go { desk.send(&data).await } else { desk.tell(&data).await }
+                    });
                 }
             })
             .background()
             .await?;
     }
+    let (name, told) = (speaker.named("/initialpose"), desk.clone());
+    speaker.listens(&name, kind::POSE_WITH_COVARIANCE, Qos::Reliable(10)).await?;
+    ros.declare_subscriber(wire::key(shared.robot.domain, &name, kind::POSE_WITH_COVARIANCE, "*"))
+        .allowed_origin(Locality::Remote)
+        .callback(move |sample| {
+            if let Ok(pose) = cdr::read(&sample.payload().to_bytes()) {
+                told.clone().work(move |desk| async move { desk.take_pose(&pose).await });
+            }
+        })
+        .background()
+        .await?;
     let (last, is) = (desk.clone(), desk);
     let answer = move |asked: Asked| {
         let asked = Arc::new(asked);
@@ -127,7 +143,7 @@ impl Desk {
 
     /// Where to go for the likeliest; none where it is rather nowhere.
     fn pose(&self, reply: &WhereReply) -> Option<PoseStamped> {
-        let best = reply.candidates.first().filter(|_| is_found(reply))?;
+        let best = reply.candidates.first().filter(|_| reply.is_found())?;
         let (x_m, y_m, yaw_rad) = match &best.goal {
             Some(goal) => (goal.x_m, goal.y_m, goal.yaw_rad),
             None => (best.x_m, best.y_m, best.yaw_rad),
@@ -135,16 +151,40 @@ impl Desk {
         Some(goal(&self.shared, &Pose { x_m, y_m, yaw_rad }))
     }
 
-    /// To a question by topic: in words, as a pose, and, if asked to go, as a goal.
-    async fn tell(&self, name: &str, go: bool) -> Result<(), String> {
+    /// To a question by topic: in words, and as a pose.
+    async fn tell(&self, name: &str) -> Result<(), String> {
         let (data, pose) = match self.ask(name).await {
             Ok(reply) => (where_text(&reply), self.pose(&reply)),
             Err(e) => (e.to_string(), None),
         };
         self.answers.write(&StringMsg { data: data.trim_end().to_owned() }).await?;
-        let Some(pose) = pose else { return Ok(()) };
-        self.answer_poses.write(&pose).await?;
-        if go { self.goals.write(&pose).await } else { Ok(()) }
+        match pose {
+            Some(pose) => self.answer_poses.write(&pose).await,
+            None => Ok(()),
+        }
+    }
+
+    /// Sends the robot there: the server tells the goal as it does for whoever asks it.
+    async fn send(&self, name: &str) -> Result<(), String> {
+        let data = match self.planner.go(name, None).await {
+            Ok(sent) => sent.words,
+            Err(e) => e.to_string(),
+        };
+        self.answers.write(&StringMsg { data }).await
+    }
+
+    /// Somebody points at where the robot is: evidence for the map.
+    async fn take_pose(&self, told: &PoseWithCovarianceStamped) -> Result<(), String> {
+        let (frame, own) = (told.header.frame_id.trim_start_matches('/'), &self.shared.robot.map_frame);
+        let data = match pointed_at(&told.pose).filter(|_| frame == own) {
+            Some(pose) => match self.planner.mend(&pose).await {
+                Ok(mended) => mended.words,
+                Err(e) => e.to_string(),
+            },
+            None => format!("a pose in {frame:?} says nothing here: give numbers in {own:?}"),
+        };
+        info!(robot = self.shared.robot.robot, "/initialpose: {data}");
+        self.answers.write(&StringMsg { data }).await
     }
 
     /// To a question without words: where what was asked for last is, or else where the robot is.
@@ -169,7 +209,7 @@ impl Desk {
         match self.ask(&name).await {
             Ok(reply) => {
                 let message = where_text(&reply).trim_end().to_owned();
-                TriggerResponse { success: is_found(&reply), message }
+                TriggerResponse { success: reply.is_found(), message }
             }
             Err(e) => TriggerResponse { success: false, message: e.to_string() },
         }
@@ -179,7 +219,7 @@ impl Desk {
         // The question is about this robot's map, whoever asks.
         match self.ask(&request.name).await {
             Ok(reply) => WhereResponse {
-                found: is_found(&reply),
+                found: reply.is_found(),
                 probability: reply.candidates.first().map_or(0.0, |best| best.probability),
                 p_none: reply.p_none,
                 pose: self.pose(&reply).unwrap_or_default(),
@@ -188,4 +228,17 @@ impl Desk {
             Err(e) => WhereResponse { message: e.to_string(), p_none: 1.0, ..WhereResponse::default() },
         }
     }
+}
+
+/// A pose and how sure it is. What leaves that open is as sure as a hand on a picture of the map; none if it is no pose.
+fn pointed_at(told: &PoseWithCovariance) -> Option<Mend> {
+    let transform = Transform { translation: told.pose.position, rotation: told.pose.orientation };
+    let sigma = |variance: f64, default: f64| if variance > 0.0 { variance.sqrt() } else { default };
+    let (planar, heading) = (0.5 * (told.covariance[0][0] + told.covariance[1][1]), told.covariance[5][5]);
+    Some(Mend::Pose {
+        id: sentence("").id,
+        map_from_body: on_floor(&isometry(&transform))?,
+        sigma_m: sigma(planar, 0.5).clamp(0.05, 100.0),
+        sigma_rad: sigma(heading, 0.26).clamp(0.02, 3.0),
+    })
 }

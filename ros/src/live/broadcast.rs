@@ -15,7 +15,7 @@ use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 use tokio::time::MissedTickBehavior;
 use toponym_proto::Pose;
-use toponym_proto::answer::PoseOut;
+use toponym_proto::answer::{Goal, PoseOut};
 use tracing::{info, warn};
 
 /// Another one who tells it is gone after so long.
@@ -35,7 +35,9 @@ pub async fn broadcast(shared: Arc<Shared>, speaker: Arc<Speaker>) -> Result<(),
     let poses = speaker.topic(&named, kind::POSE_WITH_COVARIANCE, Qos::Reliable(10)).await.map_err(why)?;
     let mut ticks = tokio::time::interval(Duration::from_secs_f64(shared.robot.transform_publish_period_s));
     ticks.set_missed_tick_behavior(MissedTickBehavior::Delay);
-    let mut pose = shared.pose.subscribe();
+    let goals =
+        speaker.topic(&speaker.named("/goal_pose"), kind::POSE, Qos::Reliable(10)).await.map_err(why)?;
+    let (mut pose, mut goal_told) = (shared.pose.subscribe(), shared.goal.subscribe());
     let (mut newest_ns, mut was_silent) = (0, false);
     loop {
         tokio::select! {
@@ -57,6 +59,13 @@ pub async fn broadcast(shared: Arc<Shared>, speaker: Arc<Speaker>) -> Result<(),
                 changed.map_err(|e| e.to_string())?;
                 let name = topic.borrow_and_update().clone();
                 transforms = speaker.topic(&name, kind::TF, Qos::Reliable(100)).await.map_err(why)?;
+            }
+            changed = goal_told.changed() => {
+                changed.map_err(|e| e.to_string())?;
+                let told = goal_told.borrow_and_update().clone();
+                if let Some(Goal { x_m, y_m, yaw_rad, .. }) = told {
+                    goals.write(&goal(&shared, &Pose { x_m, y_m, yaw_rad })).await?;
+                }
             }
             changed = pose.changed() => {
                 changed.map_err(|e| e.to_string())?;

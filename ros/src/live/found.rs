@@ -281,7 +281,7 @@ mod tests {
 
     fn arrived(name: &str, kind: &str, received_ns: i64) -> Arrived {
         let topic = Topic { name: name.into(), kind: kind.into(), is_cdr: true };
-        Arrived { topic, received_ns, numbered: None, data: Vec::new() }
+        Arrived { topic, received_ns, hashes: wire::Hashes::OfTypes, numbered: None, data: Vec::new() }
     }
 
     #[test]

@@ -21,6 +21,8 @@ pub use mouth::{Speaker, Writer};
 pub use session::now_ns;
 
 use crate::plan::Plan;
+use crate::wire::Hashes;
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::str::FromStr;
 use std::sync::atomic::AtomicI64;
@@ -28,7 +30,7 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::watch;
 use tokio::task::JoinSet;
-use toponym_proto::answer::PoseOut;
+use toponym_proto::answer::{Goal, PoseOut, Sent};
 use toponym_proto::keys::{check_id, check_link};
 use toponym_proto::{Invalid, Keys};
 use tracing::{error, info, warn};
@@ -168,10 +170,14 @@ struct Shared {
     plan: watch::Sender<Option<Plan>>,
     /// Where its transforms go.
     tf_topic: watch::Sender<String>,
+    /// How its keys tell types.
+    hashes: watch::Sender<Hashes>,
     /// Its clock.
     clock: watch::Sender<clock::RobotClock>,
     /// Where it is.
     pose: watch::Sender<Option<PoseOut>>,
+    /// Where it was sent last.
+    goal: watch::Sender<Option<Goal>>,
     /// When somebody else last told where odometry lies in a map, Unix nanoseconds.
     others_ns: AtomicI64,
     /// What was asked for last.
@@ -181,16 +187,22 @@ struct Shared {
 
 /// Connects a robot to the server for good: to its router, again whenever that goes; `own` is the server's session.
 pub async fn run(robot: RosRobot, site: String, own: Session) {
-    let mut told = false;
+    let (mut told, mut hashes) = (false, Hashes::OfTypes);
     loop {
         match session::open(&robot).await {
             Ok(ros) => {
                 info!(robot = robot.robot, "connected to {}", robot.endpoint);
-                if let Err(e) = bridge(&robot, &site, &own, &ros).await {
-                    error!(robot = robot.robot, "{e}");
-                }
+                let ended = bridge(&robot, &site, &own, &ros, hashes).await;
                 let _ = ros.close().await;
-                told = false;
+                (told, hashes) = (false, Hashes::OfTypes);
+                match ended {
+                    Ok(spoken) => {
+                        info!(robot = robot.robot, "it speaks as ROS 2 Humble does: it is answered so");
+                        hashes = spoken;
+                        continue;
+                    }
+                    Err(e) => error!(robot = robot.robot, "{e}"),
+                }
             }
             Err(_) if !told => {
                 told = true;
@@ -207,23 +219,40 @@ pub async fn run(robot: RosRobot, site: String, own: Session) {
     }
 }
 
-/// One connection, until one of its parts fails.
-async fn bridge(robot: &RosRobot, site: &str, own: &Session, ros: &Session) -> Result<(), Failure> {
+/// One connection, until one of its parts fails, or until the robot is heard to tell types otherwise than `hashes`: then how.
+async fn bridge(
+    robot: &RosRobot,
+    site: &str,
+    own: &Session,
+    ros: &Session,
+    hashes: Hashes,
+) -> Result<Hashes, Failure> {
     let ear = session::Ear::new(ros, robot).await?;
-    let speaker = Arc::new(Speaker::new(ros, robot.domain, &robot.namespace).await?);
+    let speaker = Arc::new(Speaker::new(ros, robot.domain, &robot.namespace, hashes).await?);
     let shared = Arc::new(Shared {
         robot: robot.clone(),
         site: site.to_owned(),
         own: own.clone(),
         plan: watch::Sender::new(None),
         tf_topic: watch::Sender::new("/tf".into()),
+        hashes: watch::Sender::new(hashes),
         clock: watch::Sender::new(clock::RobotClock::default()),
         pose: watch::Sender::new(None),
+        goal: watch::Sender::new(None),
         others_ns: AtomicI64::new(0),
         asked_for: Mutex::default(),
         found: Mutex::default(),
     });
-    let _poses = watch_poses(&shared).await?;
+    let keys = Keys::new(site)?;
+    let (poses, goals) = (shared.clone(), shared.clone());
+    let posed = move |pose| {
+        poses.pose.send_replace(Some(pose));
+    };
+    let _poses = watch(own, keys.pose(&robot.robot), posed).await?;
+    let sent = move |sent: Sent| {
+        goals.goal.send_replace(sent.goal);
+    };
+    let _goals = watch(own, keys.goal(&robot.robot), sent).await?;
     asked::answer_all(&shared, ros, &speaker).await?;
     // They end with this function, however it ends.
     let mut parts = JoinSet::new();
@@ -231,20 +260,27 @@ async fn bridge(robot: &RosRobot, site: &str, own: &Session, ros: &Session) -> R
     parts.spawn(broadcast::broadcast(shared.clone(), speaker.clone()));
     parts.spawn(pictures::publish(shared.clone(), speaker.clone()));
     parts.spawn(found::tell(shared.clone(), ros.clone()));
-    match parts.join_next().await {
-        Some(Ok(ended)) => ended.map_err(Into::into),
-        Some(Err(e)) => Err(e.into()),
-        None => Ok(()),
+    let mut spoken = shared.hashes.subscribe();
+    tokio::select! {
+        // A robot's nodes are all of one kind: what was taken for later than Humble is found out once.
+        heard = spoken.wait_for(|spoken| (hashes, *spoken) == (Hashes::OfTypes, Hashes::None)) => Ok(*heard?),
+        ended = parts.join_next() => match ended {
+            Some(Ok(Err(why))) => Err(why.into()),
+            Some(Err(e)) => Err(e.into()),
+            Some(Ok(Ok(()))) | None => Err("a part of the bridge has ended".into()),
+        },
     }
 }
 
-/// Keeps where the robot is as the server tells it.
-async fn watch_poses(shared: &Arc<Shared>) -> Result<Subscriber<()>, zenoh::Error> {
-    let (key, own) = (Keys::new(&shared.site)?.pose(&shared.robot.robot), shared.own.clone());
-    let shared = shared.clone();
+/// Hands over what the server publishes on a key.
+async fn watch<T: DeserializeOwned>(
+    own: &Session,
+    key: String,
+    told: impl Fn(T) + Send + Sync + 'static,
+) -> Result<Subscriber<()>, zenoh::Error> {
     let subscriber = own.declare_subscriber(key).callback(move |sample| {
-        if let Ok(pose) = serde_json::from_slice(&sample.payload().to_bytes()) {
-            shared.pose.send_replace(Some(pose));
+        if let Ok(value) = serde_json::from_slice(&sample.payload().to_bytes()) {
+            told(value);
         }
     });
     subscriber.await

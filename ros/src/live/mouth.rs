@@ -1,7 +1,7 @@
 //! What is told in ROS's words: topics, with tokens by which nodes find them.
 
 use crate::cdr;
-use crate::wire::{self, Node, Qos, Role};
+use crate::wire::{self, Hashes, Node, Qos, Role};
 use serde::Serialize;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicI64, AtomicU32, Ordering};
@@ -30,10 +30,15 @@ impl Speaker {
     ///
     /// # Errors
     /// Zenoh's.
-    pub async fn new(session: &Session, domain: u32, namespace: &str) -> Result<Self, zenoh::Error> {
+    pub async fn new(
+        session: &Session,
+        domain: u32,
+        namespace: &str,
+        hashes: Hashes,
+    ) -> Result<Self, zenoh::Error> {
         let namespace = if namespace.is_empty() { "/".to_owned() } else { namespace.to_owned() };
         let zid = session.zid().to_string();
-        let node = Node { domain, zid, id: 0, namespace, name: "toponym".into() };
+        let node = Node { domain, hashes, zid, id: 0, namespace, name: "toponym".into() };
         let speaker =
             Self { session: session.clone(), node, next_id: AtomicU32::new(1), tokens: Mutex::default() };
         let token = speaker.node.token();
@@ -62,7 +67,7 @@ impl Speaker {
     }
 
     fn key(&self, name: &str, kind: &str) -> String {
-        wire::key(self.node.domain, name, kind, &wire::hash(kind))
+        wire::key(self.node.domain, name, kind, &self.node.hashes.of(kind))
     }
 
     /// Will write a topic.

@@ -2,7 +2,7 @@
 
 use crate::bag::Topic;
 use crate::plan::{is_speech, kind};
-use crate::wire;
+use crate::wire::{self, Hashes};
 use serde_json::{Value, json};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -28,6 +28,8 @@ pub struct Arrived {
     pub topic: Topic,
     /// When, Unix nanoseconds.
     pub received_ns: i64,
+    /// How its key tells its type.
+    pub hashes: Hashes,
     /// Its number, and who sent it.
     pub numbered: Option<(i64, [u8; 16])>,
     /// CDR.
@@ -144,8 +146,9 @@ fn hand_over(
     }
     let data = sample.payload().to_bytes().into_owned();
     let numbered = sample.attachment().and_then(|bytes| wire::attached(&bytes.to_bytes()));
-    let arrived =
-        Arrived { topic: Topic { name, kind, is_cdr: true }, received_ns: now_ns(), numbered, data };
+    let topic = Topic { name, kind, is_cdr: true };
+    let hashes = Hashes::in_key(sample.key_expr().as_str());
+    let arrived = Arrived { topic, received_ns: now_ns(), hashes, numbered, data };
     if sender.try_send(arrived).is_err() {
         dropped.fetch_add(1, Ordering::Relaxed);
     }

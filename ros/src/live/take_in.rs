@@ -33,6 +33,7 @@ pub async fn take_in(shared: Arc<Shared>, mut ear: Ear) -> Result<(), String> {
     while let Some(arrived) = ear.arrivals.recv().await {
         shared.found().see(&arrived, ear.dropped.load(Ordering::Relaxed));
         notice_others(&shared, &arrived);
+        shared.hashes.send_if_modified(|hashes| std::mem::replace(hashes, arrived.hashes) != arrived.hashes);
         let Arrived { topic, received_ns, data, .. } = arrived;
         if let Err(why) = feed.take(&topic, received_ns, data, &mut out) {
             shared.found().unused(&topic.name, why);

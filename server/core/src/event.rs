@@ -115,8 +115,21 @@ pub struct Utterance {
     pub answers: Option<String>,
 }
 
+/// Where the robot is, as somebody sees it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Told {
+    /// Unique id; a second one with the same id changes nothing.
+    pub id: String,
+    /// Pose of the body in the map.
+    pub map_from_body: Pose2,
+    /// Standard deviation in each direction, metres.
+    pub sigma_m: f64,
+    /// Standard deviation of the heading, radians.
+    pub sigma_rad: f64,
+}
+
 /// What an operator mends at a desk.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command {
     /// Takes a sentence back.
     Undo {
@@ -135,4 +148,6 @@ pub enum Command {
         /// The name.
         name: String,
     },
+    /// Tells where the robot is: evidence, that can be taken back as a sentence can.
+    Pose(Told),
 }

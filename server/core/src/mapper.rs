@@ -1,23 +1,22 @@
 //! The core's public face: events in, effects out.
 
+mod hearing;
 mod standing;
 mod unseen;
 
-use crate::answers::snapshot::{Now, Shared, Snapshot, open_poses};
-use crate::answers::spoken;
+use crate::answers::snapshot::{Now, Shared, Snapshot};
 use crate::edge::Vertex;
 use crate::effects::{Effect, Effects};
-use crate::event::{Odom, Scan, StampNs, Utterance};
+use crate::event::{Command, Odom, Scan, StampNs};
 use crate::filter::Filter;
 use crate::filter::loops::Measured;
-use crate::filter::particle::Particle;
 use crate::geometry::{Pose2, wrap};
-use crate::graph::{Graph, stretches};
+use crate::graph::Graph;
 use crate::mapper::standing::Standing;
 use crate::smoothing::SmoothError;
-use crate::talk::{Here, Talk};
+use crate::talk::Talk;
 use crate::track::Track;
-use crate::track::places::{FrozenPlace, OpenPlace};
+use crate::track::places::FrozenPlace;
 use crate::trial::Trial;
 use crate::{Answer, Config, Event, Query};
 use nalgebra::Matrix3;
@@ -73,7 +72,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 14 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 15 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -110,6 +109,7 @@ impl Mapper {
             Event::Odom(odom) => self.odom(&odom, &mut effects),
             Event::Scan(scan) => self.scan(scan, &mut effects),
             Event::Utterance(utterance) => self.hear(&utterance, &mut effects),
+            Event::Command(Command::Pose(told)) => self.told(&told, &mut effects),
             Event::Command(command) => {
                 self.change(&mut effects, |filter, talk| vec![Effect::Mended(talk.mend(filter, &command))]);
                 self.stand(&mut effects);
@@ -277,53 +277,6 @@ impl Mapper {
             let why = doubt.why(&self.snapshot().differences());
             effects.push(Effect::StateChanged { stamp_ns, state, why });
         }
-    }
-
-    fn hear(&mut self, u: &Utterance, effects: &mut Effects) {
-        let open: Vec<OpenPlace> = self.track.front.open_places().cloned().collect();
-        let places = self.filter.graph.places().to_vec();
-        let path_m: Vec<f64> = places.iter().map(|p| p.path_m).chain(open.iter().map(|p| p.path_m)).collect();
-        let stamps = places.iter().map(|p| p.stamp_ns).chain(open.iter().map(|p| p.stamp_ns));
-        let stamps: Vec<StampNs> = stamps.collect();
-        // The place held when the sentence began; one from before the map is said of its first.
-        let held = stamps.iter().rposition(|&s| s <= u.began_ns).or((!stamps.is_empty()).then_some(0));
-        let poses = |p: &Particle| {
-            let mut poses = p.belief.poses();
-            poses.extend(open_poses(p, &places, &open));
-            poses
-        };
-        let (part, dark) = self.parts(&open);
-        let here = Here { held: held.map(|v| v as Vertex), poses: &poses, path_m, part, dark };
-        let mut heard = None;
-        self.change(effects, |filter, talk| {
-            heard = Some(talk.hear(filter, u, &here));
-            Effects::new()
-        });
-        if let Some((mut heard, asks)) = heard {
-            if !asks.is_empty() {
-                heard.words = spoken::answers(&self.snapshot(), &asks, &heard.words);
-            }
-            effects.push(Effect::Heard(heard));
-        }
-        self.stand(effects);
-    }
-
-    /// For all places, those not left yet included: in which part of the map they are, and whether the robot sees
-    /// nothing there or soon after: in the dark the first places come late.
-    fn parts(&self, open: &[OpenPlace]) -> (Vec<usize>, Vec<bool>) {
-        let places = self.filter.graph.places();
-        let chains = places.iter().map(|p| &p.chain).chain(open.iter().map(|p| &p.chain));
-        let unseen: Vec<bool> = chains.map(|c| c.unseen).chain([self.track.front.sees_nothing()]).collect();
-        let mut stretches = self.filter.graph.stretches.clone();
-        let mut before_m = places.last().map(|p| p.path_m);
-        for (v, place) in (places.len()..).zip(open) {
-            if let Some(before_m) = before_m.replace(place.path_m) {
-                stretches.extend(v as Vertex, &place.chain, place.path_m - before_m);
-            }
-        }
-        let ends = stretches.ends();
-        let part = (0..places.len() + open.len()).map(|v| stretches::part(&ends, v as Vertex));
-        (part.collect(), unseen.windows(2).map(|w| w[0] || w[1]).collect())
     }
 
     fn flush(&mut self, effects: &mut Effects) {

@@ -86,8 +86,11 @@ fn grants(keys: &Keys, name: &str, user: &User) -> Grants {
         grants.watch(&keys.map_outputs("*"));
         grants.ask(&keys.map_outputs("*"), &everything);
     }
+    if is(&[Role::Planner]) {
+        grants.ask(&keys.command("go"), &everything);
+    }
     if is(&[Role::Guide]) {
-        for command in ["undo", "rename", "forget"] {
+        for command in ["undo", "rename", "forget", "initial_pose"] {
             grants.ask(&keys.command(command), &everything);
         }
     }

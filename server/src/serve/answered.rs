@@ -2,7 +2,7 @@
 //! time for one grows.
 
 use std::collections::BTreeMap;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 use toponym_core::Snapshot;
 use toponym_core::answers::query::WhereAnswer;
@@ -11,9 +11,13 @@ use super::board::lock;
 
 /// Questions whose answers are kept; beyond, each is reckoned anew.
 const KEPT_MAX: usize = 256;
-/// While an answer is reckoned one waits for it, and others get that of the snapshot before, some tenths of a second old;
-/// so many wait where something was said in between: who has just said it wants to find it.
-const WAITING_MAX: usize = 8;
+/// While an answer is reckoned others get that of the snapshot before, some tenths of a second old. Who has just said
+/// something wants to find it, and waits: so many at first …
+const WAITING_MAX: u64 = 8;
+/// … and then one in so many who ask.
+const WAITS_ONE_IN: u64 = 200;
+/// How many are asked until half of them are forgotten.
+const REMEMBERED: u64 = 4000;
 
 /// What is asked, and in which language.
 type Question = (String, Option<String>);
@@ -25,6 +29,27 @@ type From = (Arc<Snapshot>, Arc<Slot>);
 #[derive(Default)]
 pub struct Answered {
     kept: Mutex<Kept>,
+    waits: Mutex<Waits>,
+}
+
+/// How many have asked of late, and how many of them were made to wait.
+#[derive(Default)]
+struct Waits {
+    asked: u64,
+    waited: u64,
+}
+
+impl Waits {
+    /// Whether one more may be made to wait.
+    fn more(&mut self) -> bool {
+        if self.asked >= REMEMBERED {
+            (self.asked, self.waited) = (self.asked / 2, self.waited / 2);
+        }
+        self.asked += 1;
+        let may = self.waited * WAITS_ONE_IN < self.asked + WAITING_MAX * WAITS_ONE_IN;
+        self.waited += u64::from(may);
+        may
+    }
 }
 
 #[derive(Default)]
@@ -39,8 +64,8 @@ struct Kept {
 #[derive(Default)]
 struct Slot {
     answer: OnceLock<WhereAnswer>,
-    /// How many have asked before it was there.
-    waiting: AtomicUsize,
+    /// Whether somebody reckons it.
+    begun: AtomicBool,
 }
 
 impl Answered {
@@ -51,18 +76,25 @@ impl Answered {
         text: &str,
         lang: Option<&str>,
     ) -> (Arc<Snapshot>, WhereAnswer) {
-        let answer = || snapshot.where_is(text, lang);
         let (slot, before) = self.slots(snapshot, (text.to_owned(), lang.map(str::to_owned)));
-        let Some(slot) = slot else { return (snapshot.clone(), answer()) };
-        if slot.answer.get().is_none()
-            && let nth = slot.waiting.fetch_add(1, Ordering::Relaxed)
-            && let Some((from, answer)) = before
-                .filter(|(from, _)| nth >= if from.says_the_same(snapshot) { 1 } else { WAITING_MAX })
-                .and_then(|(from, slot)| Some((from, slot.answer.get()?.clone())))
+        let Some(slot) = slot else { return (snapshot.clone(), snapshot.where_is(text, lang)) };
+        if let Some(answer) = slot.answer.get() {
+            lock(&self.waits).asked += 1;
+            return (snapshot.clone(), answer.clone());
+        }
+        let before = before.and_then(|(from, slot)| Some((from, slot.answer.get()?.clone())));
+        if let Some((from, answer)) = before
+            && (from.says_the_same(snapshot) || !lock(&self.waits).more())
         {
+            if !slot.begun.swap(true, Ordering::Relaxed) {
+                let (snapshot, text, lang) = (snapshot.clone(), text.to_owned(), lang.map(str::to_owned));
+                rayon::spawn(move || {
+                    slot.answer.get_or_init(|| snapshot.where_is(&text, lang.as_deref()));
+                });
+            }
             return (from, answer);
         }
-        (snapshot.clone(), slot.answer.get_or_init(answer).clone())
+        (snapshot.clone(), slot.answer.get_or_init(|| snapshot.where_is(text, lang)).clone())
     }
 
     /// Where its answer is kept, none if there are too many; and the newest one from before.
@@ -116,28 +148,40 @@ mod tests {
     }
 
     #[test]
-    fn one_waits_and_others_get_the_answer_before() {
+    fn nobody_waits_where_nothing_was_said_and_the_next_have_it() {
         let ([first, second], answered) = (snapshots(), Answered::default());
         answered.where_is(&first, "gym", None);
-        let slot = answered.slots(&second, ("gym".into(), None)).0.unwrap();
-        slot.waiting.store(1, Ordering::Relaxed);
         assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &first));
         assert!(Arc::ptr_eq(&answered.where_is(&second, "cafe", None).0, &second), "there is none before");
-        slot.answer.set(second.where_is("gym", None)).unwrap();
+        answered.slots(&second, ("gym".into(), None)).0.unwrap().answer.wait();
         assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &second));
     }
 
     #[test]
     fn who_has_said_something_waits_unless_many_do() {
-        let mut mapper = Mapper::new(Config::default());
-        let (answered, first) = (Answered::default(), mapper.snapshot());
-        answered.where_is(&first, "gym", None);
-        mapper.step(Event::Glossary("refectory = canteen".into()));
-        let second = mapper.snapshot();
-        let slot = answered.slots(&second, ("gym".into(), None)).0.unwrap();
-        slot.waiting.store(WAITING_MAX, Ordering::Relaxed);
-        assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &first));
-        slot.waiting.store(WAITING_MAX - 1, Ordering::Relaxed);
-        assert!(Arc::ptr_eq(&answered.where_is(&second, "gym", None).0, &second));
+        let (mut mapper, answered) = (Mapper::new(Config::default()), Answered::default());
+        let mut last = mapper.snapshot();
+        answered.where_is(&last, "gym", None);
+        let mut found = 0;
+        for k in 0..2 * WAITING_MAX {
+            mapper.step(Event::Glossary(format!("refectory = canteen{k}")));
+            let next = mapper.snapshot();
+            let (from, _) = answered.where_is(&next, "gym", None);
+            found += u64::from(Arc::ptr_eq(&from, &next));
+            assert!(Arc::ptr_eq(&from, &next) || Arc::ptr_eq(&from, &last));
+            answered.slots(&next, ("gym".into(), None)).0.unwrap().answer.wait();
+            last = next;
+        }
+        assert_eq!(found, WAITING_MAX + 1, "the first, and one of those who asked since");
+    }
+
+    #[test]
+    fn of_many_few_wait() {
+        let mut waits = Waits::default();
+        let waited = (0..10 * REMEMBERED).filter(|_| waits.more()).count() as u64;
+        assert!(waited < 10 * REMEMBERED / 100, "{waited}: one in a hundred");
+        // After a quiet time the next may wait again.
+        (0..WAITS_ONE_IN * 2).for_each(|_| waits.asked += 1);
+        assert!(waits.more());
     }
 }

@@ -1,7 +1,7 @@
 //! Command line of `serve`.
 
 use super::board::Board;
-use super::queries::save_all;
+use super::commands::save_all;
 use super::{ServeError, Server, network};
 use crate::access::Policy;
 use crate::config::ServerConfig;

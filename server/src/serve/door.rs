@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
-use toponym_proto::answer::Problem;
+use toponym_proto::answer::{Problem, Sent};
 use tracing::error;
 
 use super::board::Board;
@@ -35,6 +35,8 @@ pub enum Arrival {
         /// Where to tell.
         reply: SyncSender<Result<(), Problem>>,
     },
+    /// A robot is sent somewhere.
+    Goal(Box<Sent>),
     /// The server stops: move on what there is, then end.
     Stop,
 }

@@ -144,6 +144,10 @@ impl Intake {
                 let _ = reply.send(self.delete(&map));
                 return;
             }
+            Arrival::Goal(sent) => {
+                self.outbox.send(self.keys.goal(&sent.robot), &*sent);
+                return;
+            }
             Arrival::Stop => return,
         };
         let robot = match self.keys.input(&key) {

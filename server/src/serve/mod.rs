@@ -17,6 +17,7 @@ mod answered;
 pub mod args;
 mod arguments;
 pub mod board;
+mod commands;
 pub mod door;
 mod intake;
 mod log;

@@ -3,25 +3,20 @@
 
 use serde::Serialize;
 use std::sync::Arc;
-use std::sync::mpsc::sync_channel;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::{SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
 use toponym_core::{Answer, Query};
-use toponym_proto::answer::{ANSWER_VERSION, Clocks, Done, ErrorCode, Mended, Problem, RobotState};
+use toponym_proto::answer::{ANSWER_VERSION, Clocks, ErrorCode, Problem, RobotState};
 use toponym_proto::codec::{ENCODING_JSON, ENCODING_PNG};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
-use toponym_proto::{Invalid, Limits, Mend, Message, Stamp};
+use toponym_proto::{Invalid, Limits, Stamp};
 
 use super::arguments::{asked, check_localised, check_robot, known, point, resolution_m, take, understood};
 use super::board::{Board, MapView, lock};
-use super::door::Arrival;
-use super::scribe::Work;
-use super::watch;
+use super::{commands, watch};
 use crate::convert;
 
-/// How long a command waits for a map that is busy.
-const COMMAND_WAIT: Duration = Duration::from_secs(60);
 const RESOLUTION_DEFAULT_M: f64 = 0.05;
 
 /// All keys there are something to ask on, for queries with wildcards.
@@ -88,14 +83,7 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
     match board.keys.chunks(key).unwrap_or_default().as_slice() {
         ["info"] => info(board, &arguments),
         ["time"] => time(board, arguments),
-        ["do", "save"] => save(board, &arguments),
-        ["do", "delete"] => delete(board, arguments),
-        ["do", command @ ("undo" | "rename" | "forget")] => mend(board, command, arguments),
-        ["do", command] => {
-            Err(Problem::new(ErrorCode::Unsupported, format!("there is no command {command:?}"))
-                .field("key")
-                .hint("this server knows do/save, do/delete, do/undo, do/rename, do/forget"))
-        }
+        ["do", command] => commands::done(board, command, arguments),
         ["map", id, "ask", what] => {
             let map = map(board, id)?;
             match Ask::ALL.into_iter().find(|ask| ask.as_str() == *what) {
@@ -123,7 +111,8 @@ fn no_such_query(key: &str) -> Problem {
     Problem::new(ErrorCode::NoSuchQuery, format!("{key} can't be asked")).field("key")
 }
 
-fn map(board: &Board, id: &str) -> Result<Arc<MapView>, Problem> {
+/// A map by its id.
+pub fn map(board: &Board, id: &str) -> Result<Arc<MapView>, Problem> {
     if let Some(problem) = lock(&board.broken).get(id) {
         return Err(problem.clone());
     }
@@ -139,7 +128,8 @@ fn map(board: &Board, id: &str) -> Result<Arc<MapView>, Problem> {
     })
 }
 
-fn json<T: Serialize>(value: &T) -> Result<Reply, Problem> {
+/// An answer as JSON.
+pub fn json<T: Serialize>(value: &T) -> Result<Reply, Problem> {
     serde_json::to_vec(value).map(Reply::json).map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))
 }
 
@@ -227,100 +217,6 @@ fn time(board: &Board, arguments: Arguments) -> Result<Reply, Problem> {
         now: Stamp { ns: since_1970.as_nanos() as i64 },
         robots: lock(&board.robots).iter().filter_map(newest).collect(),
     })
-}
-
-/// `do/save?map=…`, or all maps.
-fn save(board: &Board, arguments: &Arguments) -> Result<Reply, Problem> {
-    let [id] = take(arguments.clone(), ["map"])?;
-    let maps = match id {
-        Some(id) => save_maps(vec![map(board, &id)?])?,
-        None => save_all(board)?,
-    };
-    json(&Done { v: ANSWER_VERSION, query: "save".into(), maps })
-}
-
-/// `do/delete?map=…`.
-fn delete(board: &Board, arguments: Arguments) -> Result<Reply, Problem> {
-    let [id] = take(arguments, ["map"])?;
-    let missing = || Problem::new(ErrorCode::BadArgument, "map is missing").field("map");
-    let (map, (reply, done)) = (id.ok_or_else(missing)?, sync_channel(1));
-    let stops = || Problem::new(ErrorCode::Internal, "the server stops");
-    let control = board.control.get().ok_or_else(stops)?;
-    control.send(Arrival::Delete { map: map.clone(), reply }).map_err(|_| stops())?;
-    done.recv_timeout(COMMAND_WAIT).map_err(|_| stops())??;
-    json(&Done { v: ANSWER_VERSION, query: "delete".into(), maps: vec![map] })
-}
-
-/// Saves all maps and tells their ids.
-pub fn save_all(board: &Board) -> Result<Vec<String>, Problem> {
-    save_maps(board.maps.load().values().cloned().collect())
-}
-
-fn save_maps(maps: Vec<Arc<MapView>>) -> Result<Vec<String>, Problem> {
-    let mut saved = Vec::new();
-    for map in maps {
-        let (reply, done) = sync_channel(1);
-        let stopped = || Problem::new(ErrorCode::Internal, format!("map {:?} has stopped", map.id));
-        map.work.send(Work::Save(reply)).map_err(|_| stopped())?;
-        match done.recv_timeout(COMMAND_WAIT) {
-            Ok(Ok(())) => saved.push(map.id.clone()),
-            Ok(Err(e)) => return Err(Problem::new(ErrorCode::Internal, e)),
-            Err(_) => return Err(Problem::new(ErrorCode::Busy, format!("map {:?} is busy", map.id))),
-        }
-    }
-    Ok(saved)
-}
-
-/// `do/undo?id=…`, `do/rename?from=…;to=…`, `do/forget?name=…`, each with `map=…` where there are several.
-fn mend(board: &Board, command: &str, arguments: Arguments) -> Result<Reply, Problem> {
-    let given = |field: &str, value: Option<String>| {
-        value.ok_or_else(|| Problem::new(ErrorCode::BadArgument, format!("{field} is missing")).field(field))
-    };
-    let (id, mend) = match command {
-        "undo" => {
-            let [map, id] = take(arguments, ["map", "id"])?;
-            (map, Mend::Undo { id })
-        }
-        "rename" => {
-            let [map, from, to] = take(arguments, ["map", "from", "to"])?;
-            (map, Mend::Rename { from: given("from", from)?, to: given("to", to)? })
-        }
-        _ => {
-            let [map, name] = take(arguments, ["map", "name"])?;
-            (map, Mend::Forget { name: given("name", name)? })
-        }
-    };
-    Message::Mend(mend.clone()).validate(&Limits::default()).map_err(Problem::from)?;
-    let map = match id {
-        Some(id) => map(board, &id)?,
-        None => only_map(board)?,
-    };
-    let (reply, done) = sync_channel(1);
-    let stopped = || Problem::new(ErrorCode::Internal, format!("map {:?} has stopped", map.id));
-    map.work.send(Work::Mend(mend, reply)).map_err(|_| stopped())?;
-    match done.recv_timeout(COMMAND_WAIT) {
-        Ok(Ok(words)) => {
-            let (query, map) = (command.to_owned(), map.id.clone());
-            json(&Mended { v: ANSWER_VERSION, query, map, words, durable: true })
-        }
-        Ok(Err(why)) => Err(Problem::new(ErrorCode::NothingToMend, why)),
-        // Not `busy`, which is asked again: it may be done yet.
-        Err(_) => Err(Problem::new(ErrorCode::Internal, format!("map {:?} did not answer in time", map.id))),
-    }
-}
-
-fn only_map(board: &Board) -> Result<Arc<MapView>, Problem> {
-    let maps = board.maps.load();
-    let mut all = maps.values();
-    match (all.next(), all.next()) {
-        (Some(only), None) => Ok(only.clone()),
-        (None, _) => map(board, ""),
-        _ => {
-            let known: Vec<&str> = maps.keys().map(String::as_str).collect();
-            let hint = format!("say which: {}", known.join(", "));
-            Err(Problem::new(ErrorCode::BadArgument, "there are several maps").field("map").hint(hint))
-        }
-    }
 }
 
 #[cfg(test)]

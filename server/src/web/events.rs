@@ -22,9 +22,9 @@ pub const LAST_EVENT: &str = "end";
 /// Something that happened.
 #[derive(Debug)]
 pub struct Published {
-    /// `pose`, `heard`, `state`, `jump`, or `map` for one that has changed.
+    /// `pose`, `heard`, `state`, `jump`, `mended`, or `map` for one that has changed.
     pub name: &'static str,
-    /// As in PROTOCOL.md; of `map` its identity.
+    /// As in PROTOCOL.md; of `mended` what was answered, of `map` its identity.
     pub json: Vec<u8>,
     /// Of which robot or map.
     pub of: String,

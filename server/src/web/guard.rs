@@ -66,7 +66,8 @@ impl Who {
         let chunks: Vec<&str> = path.trim_matches('/').split('/').collect();
         match chunks[..] {
             ["robot", robot, "say"] => is(&[Role::Guide]) && self.is_about(robot),
-            ["do", "undo" | "rename" | "forget"] => is(&[Role::Guide, Role::Operator]),
+            ["do", "undo" | "rename" | "forget" | "initial_pose"] => is(&[Role::Guide, Role::Operator]),
+            ["do", "go"] => is(&[Role::Planner, Role::Operator]),
             ["do", _] => is(&[Role::Operator]),
             ["robot", robot, "out", "heard"] => self.may_hear(robot),
             ["map", _, "sentences"] => self.may_hear_some(),

@@ -10,10 +10,12 @@
 //! POST /do/{command}?…           undo, rename, forget, save, delete
 //! GET  /events                   server-sent events: poses, what was heard, maps that changed, jumps
 //! GET  /healthz, /metrics        how the server does
+//! GET  /ca.pem                   beyond this machine: the authority to trust, if `cert new` made it
 //! ```
 //!
 //! The path is the key after `toponym/v1/{site}`. Pages ask nothing of any other host, and their policy forbids it.
 
+mod address;
 mod api;
 mod events;
 mod guard;
@@ -38,7 +40,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
-use tracing::{error, info, warn};
+use tracing::{error, warn};
 
 /// A request's head comes within this.
 const HEAD_WAIT: Duration = Duration::from_secs(10);
@@ -80,13 +82,19 @@ pub async fn serve(
         routes(Arc::new(Web { board, door, guard, permits, tiles })).merge(health.clone())
     };
     let served = if local.ip().is_loopback() {
-        tell("http", local);
+        address::tell_local(local);
         let router = pages(Guard::new(policy, Some(hosts(config, address, local.port()))));
         tokio::spawn(async move { ended(axum::serve(listener, router).await) })
     } else if let Some(tls) = tls {
-        tell("https", local);
+        let authority = address::authority(config);
+        address::tell(config, local, authority.is_some());
         // What a certificate is not of, no browser shows.
-        let router = pages(Guard::new(policy, None)).into_make_service();
+        let mut router = pages(Guard::new(policy, None));
+        if let Some(file) = authority {
+            // For whoever does not trust the rest yet, and so has not said who they are.
+            router = router.route("/ca.pem", get(move || address::ca(file.clone())));
+        }
+        let router = router.into_make_service();
         let tls = RustlsConfig::from_pem_file(&tls.certificate, &tls.key).await?;
         let mut server =
             axum_server::from_tcp_rustls(listener.into_std()?, tls)?.first_request_timeout(HEAD_WAIT);
@@ -101,10 +109,6 @@ pub async fn serve(
         tokio::spawn(async move { ended(axum::serve(listener, health).await) })
     };
     Ok((served, Some(local)))
-}
-
-fn tell(scheme: &str, local: SocketAddr) {
-    info!("pages: {scheme}://{local}/ shows the map, {scheme}://{local}/guide is for whoever talks");
 }
 
 fn ended(served: io::Result<()>) {

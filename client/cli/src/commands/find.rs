@@ -1,10 +1,10 @@
-//! `toponym where`, `nearest`, `what`, `labels`, `rooms`.
+//! `toponym where`, `nearest`, `go`, `what`, `labels`, `rooms`.
 
 use super::{Failure, exit};
 use std::fmt::Write as _;
 use std::io::Write as _;
 use std::time::Duration;
-use toponym::told::{is_found, where_text};
+use toponym::told::where_text;
 use toponym::{Connection, Planner};
 use toponym_proto::answer::{LabelsReply, WhatReply};
 use toponym_proto::regions::{Region, RegionsReply};
@@ -51,7 +51,7 @@ pub async fn find(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, F
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.where_is_in(&args.name, args.lang.as_deref()).await?;
     print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
-    Ok(if is_found(&reply) { exit::FOUND } else { exit::NOT_KNOWN })
+    Ok(if reply.is_found() { exit::FOUND } else { exit::NOT_KNOWN })
 }
 
 pub async fn nearest(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8, Failure> {
@@ -59,7 +59,34 @@ pub async fn nearest(to: &Connection, site: &str, args: &WhereArgs) -> Result<u8
     let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
     let reply = planner.nearest(&args.name, args.lang.as_deref()).await?;
     print(&if args.asked.json { json(&reply)? } else { where_text(&reply) })?;
-    Ok(if is_found(&reply) { exit::FOUND } else { exit::NOT_KNOWN })
+    Ok(if reply.is_found() { exit::FOUND } else { exit::NOT_KNOWN })
+}
+
+/// Arguments of `go`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  toponym go kitchen
+  toponym go 'the bathroom next to the lounge' --map floor2
+
+Whatever drives the robot hears of it: Nav2 as /goal_pose where the server is given --ros, other programs on
+toponym/v1/SITE/robot/ROBOT/out/goal. Exit code 1 if it is rather nowhere, or can't be reached: then nothing is sent.")]
+pub struct GoArgs {
+    /// A name, or what it is next to.
+    name: String,
+    /// In which language (en, de).
+    #[arg(long, value_name = "TAG")]
+    lang: Option<String>,
+    #[command(flatten)]
+    asked: AskedArgs,
+}
+
+pub async fn go(to: &Connection, site: &str, args: &GoArgs) -> Result<u8, Failure> {
+    let session = to.open().await?;
+    let planner = Planner::new(&session, site, &args.asked.map, args.asked.timeout)?;
+    let sent = planner.go(&args.name, args.lang.as_deref()).await?;
+    print(&if args.asked.json { json(&sent)? } else { format!("{}\n", sent.words) })?;
+    Ok(if sent.goal.is_some() { exit::FOUND } else { exit::NOT_KNOWN })
 }
 
 /// Arguments of `what`.

@@ -1,10 +1,10 @@
-//! `toponym undo`, `rename` and `forget`: an operator mends what was said.
+//! `toponym undo`, `rename`, `forget` and `initial-pose`: an operator mends what was said, and what the robot believes.
 
 use super::{Failure, exit};
 use std::time::Duration;
 use toponym::{ClientError, Connection, Planner};
-use toponym_proto::Mend;
 use toponym_proto::answer::ErrorCode;
+use toponym_proto::{Mend, Pose};
 
 /// Arguments of `undo`.
 #[derive(Debug, clap::Args)]
@@ -50,6 +50,52 @@ pub struct ForgetArgs {
     name: String,
     #[command(flatten)]
     at: At,
+}
+
+/// Arguments of `initial-pose`.
+#[derive(Debug, clap::Args)]
+#[command(after_help = "\
+Examples:
+  toponym initial-pose 3.2,-1,90
+  toponym initial-pose 3.2,-1,90 --within 2,30
+
+For a robot that was switched on anywhere, or doubts where it is. It is evidence, not the truth: scans may speak against it, and
+`toponym undo` takes it back.")]
+pub struct InitialPoseArgs {
+    /// Metres, metres and degrees, in the map.
+    #[arg(value_name = "X,Y,HEADING", value_parser = three, allow_hyphen_values = true)]
+    pose: [f64; 3],
+    /// How sure that is: standard deviations, metres and degrees.
+    #[arg(long, value_name = "M,DEGREES", value_parser = two, default_value = "0.5,15")]
+    within: [f64; 2],
+    #[command(flatten)]
+    at: At,
+}
+
+fn numbers<const N: usize>(text: &str) -> Result<[f64; N], String> {
+    let all: Result<Vec<f64>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    all.ok()
+        .and_then(|all| all.try_into().ok())
+        .ok_or_else(|| format!("give {N} numbers, with commas between"))
+}
+
+fn three(text: &str) -> Result<[f64; 3], String> {
+    numbers(text)
+}
+
+fn two(text: &str) -> Result<[f64; 2], String> {
+    numbers(text)
+}
+
+pub async fn initial_pose(to: &Connection, site: &str, args: &InitialPoseArgs) -> Result<u8, Failure> {
+    let ([x_m, y_m, degrees], [sigma_m, sigma_degrees]) = (args.pose, args.within);
+    let told = Mend::Pose {
+        id: toponym::guide::sentence("").id,
+        map_from_body: Pose { x_m, y_m, yaw_rad: degrees.to_radians() },
+        sigma_m,
+        sigma_rad: sigma_degrees.to_radians(),
+    };
+    mend(to, site, &args.at, &told).await
 }
 
 /// Arguments of `delete`.

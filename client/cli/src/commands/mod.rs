@@ -1,5 +1,6 @@
 //! The command line: arguments, exit codes, and one function per command.
 
+mod bag;
 mod dictate;
 mod find;
 mod grid;
@@ -117,6 +118,8 @@ enum Command {
     What(find::WhatArgs),
     /// Where is the nearest of its kind, by the way there from the robot?
     Nearest(find::WhereArgs),
+    /// Send the robot to where something is.
+    Go(find::GoArgs),
     /// List the rooms: how large, what they are called, where they lead.
     Rooms(find::AskedArgs),
     /// Write what stands where as a picture.
@@ -127,6 +130,8 @@ enum Command {
     Rename(mend::RenameArgs),
     /// Forget a name.
     Forget(mend::ForgetArgs),
+    /// Tell where the robot is.
+    InitialPose(mend::InitialPoseArgs),
     /// End a map, and make room for another.
     Delete(mend::DeleteArgs),
     /// How does the server do?
@@ -134,6 +139,8 @@ enum Command {
     /// Play a recorded log to the server, as robot and guide.
     Replay(play::ReplayArgs),
     Simulate(SimulateArgs),
+    /// Write a recorded log as a ROS 2 bag.
+    Bag(bag::BagArgs),
 }
 
 /// Why a command failed.
@@ -191,15 +198,18 @@ async fn done(args: &Args) -> Result<u8, Failure> {
         Command::Labels(asked) => find::labels(&to, &args.site, asked).await,
         Command::What(asked) => find::what(&to, &args.site, asked).await,
         Command::Nearest(asked) => find::nearest(&to, &args.site, asked).await,
+        Command::Go(asked) => find::go(&to, &args.site, asked).await,
         Command::Rooms(asked) => find::rooms(&to, &args.site, asked).await,
         Command::Grid(grid) => grid::grid(&to, &args.site, grid).await,
         Command::Undo(undo) => mend::undo(&to, &args.site, undo).await,
         Command::Rename(rename) => mend::rename(&to, &args.site, rename).await,
         Command::Forget(forget) => mend::forget(&to, &args.site, forget).await,
+        Command::InitialPose(told) => mend::initial_pose(&to, &args.site, told).await,
         Command::Delete(delete) => mend::delete(&to, &args.site, delete).await,
         Command::Status(asked) => status::status(&to, &args.site, asked).await,
         Command::Replay(replay) => play::replay(&to, &args.site, replay).await,
         Command::Simulate(simulate) => simulated(simulate),
+        Command::Bag(asked) => bag::bag(asked),
     }
 }
 

@@ -42,7 +42,7 @@ pub struct Named {
     /// All places, not frozen ones too, in the best graph's map.
     places: Vec<GroundPlace>,
     stamps_ns: Vec<StampNs>,
-    /// The region of each frozen place.
+    /// The region of each place.
     region_of: Vec<Option<usize>>,
     /// Of utterances that are evidence the place held, and the region in which who spoke was.
     said_in: BTreeMap<u32, (Vertex, Option<usize>)>,
@@ -76,6 +76,12 @@ impl Named {
             for &v in &region.places {
                 region_of[v as usize] = Some(r);
             }
+        }
+        // Places not left yet have seen nothing of their room so far, but are in it.
+        let left =
+            rooms.regions.iter().flat_map(|r| &r.places).max().map_or(0, |&newest| newest as usize + 1);
+        for (of, at) in region_of.iter_mut().zip(&places).skip(left) {
+            *of = rooms.at(at.x_m, at.y_m);
         }
         let outright = vec![BTreeMap::new(); rooms.regions.len()];
         let described = figures(ledger).into_iter().map(|label| (label, OnceLock::new())).collect();

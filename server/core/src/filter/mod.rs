@@ -31,7 +31,7 @@ use crate::filter::chance::{log_add, log_looks};
 use crate::filter::ghosts::{Ghost, Ghosts, difference};
 use crate::filter::loops::{Fit, Loops, Measured, measure_again};
 use crate::filter::particle::{Edge, Particle};
-use crate::filter::propose::propose;
+use crate::filter::propose::{PointedAt, propose};
 use crate::filter::prune::{KEPT_MIN, effective_sample_size, keep_best, merge, normalise, rank};
 use crate::filter::question::{Questions, Testimony};
 use crate::filter::reasons::{refusals, report};
@@ -73,6 +73,8 @@ pub struct Filter {
     /// Factors that some particles hold and others don't.
     disputed: Vec<FactorId>,
     second_looks: SecondLooks,
+    /// Where somebody saw the robot last.
+    pointed_at: Option<PointedAt>,
 }
 
 impl Filter {
@@ -88,6 +90,7 @@ impl Filter {
             ghosts: Ghosts::default(),
             disputed: Vec::new(),
             second_looks: SecondLooks::default(),
+            pointed_at: None,
         }
     }
 
@@ -170,6 +173,11 @@ impl Filter {
         }
     }
 
+    /// The robot was seen there: near by it is looked for from now on.
+    pub fn look_near(&mut self, place: Vertex, map_from_place: Pose2, within_m: f64) {
+        self.pointed_at = Some(PointedAt { place, map_from_place, within_m });
+    }
+
     /// Puts an edge into the graph of every particle, whatever speaks against it: a trial, see
     /// [`crate::trial`]. The other answer is dropped, not forgotten.
     pub fn impose(&mut self, t: Vertex, fit: &Fit) {
@@ -224,11 +232,9 @@ impl Filter {
     /// The union of what the particles would look at, one entry per older place, in order.
     fn propose(&self, t: Vertex) -> Vec<Proposal> {
         let followed = |b: &Belief, i: Vertex| self.loops.covers(&self.graph, i, t, |v| b.pose(v));
-        let per_particle: Vec<Vec<Proposal>> = self
-            .particles
-            .par_iter()
-            .map(|p| propose(&self.config, &self.graph, &self.structure, p, t, followed))
-            .collect();
+        let shared = (&self.graph, &*self.structure, self.pointed_at.as_ref());
+        let per_particle: Vec<Vec<Proposal>> =
+            self.particles.par_iter().map(|p| propose(&self.config, shared, p, t, followed)).collect();
         let mut union: BTreeMap<Vertex, Proposal> = BTreeMap::new();
         for p in per_particle.into_iter().flatten() {
             let known = union.entry(p.i).or_insert(p);

@@ -7,10 +7,12 @@
 use crate::config::Config;
 use crate::edge::{EdgeKind, Proposal, Vertex};
 use crate::filter::particle::Particle;
+use crate::geometry::Pose2;
 use crate::graph::Graph;
 use crate::random::{Purpose, uniform};
 use crate::smoothing::{Belief, Relative, Structure};
 use crate::track::front::LOCAL_PATH_M;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Older places looked at per new place and particle.
@@ -26,6 +28,10 @@ pub const RELOCALISATION_P: f64 = 0.2;
 /// The same for the places just before the break: mostly a robot is where it was.
 const STAYED_P: f64 = 0.9;
 const STAYED_PATH_M: f64 = 3.0;
+/// Probability of an edge to a place where somebody saw the robot …
+const POINTED_AT_P: f64 = 0.9;
+/// … so far along the path since.
+const POINTED_AT_PATH_M: f64 = 15.0;
 /// Similarities below are chance.
 pub const SIMILARITY_MIN: f64 = 0.02;
 
@@ -69,12 +75,22 @@ pub fn is_lost(graph: &Graph, structure: &Structure, belief: &Belief, t: Vertex)
             .is_ok_and(|all| all.iter().all(|r| r.sigma_m() > LOST_SIGMA_M))
 }
 
-/// What equal particles would look at from place `t`: distance edges, semantic edges, and any place
-/// when it is lost. `followed` says which older places are already being followed.
+/// Where somebody saw the robot last, in the map.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PointedAt {
+    /// The place that it was at.
+    pub place: Vertex,
+    /// Where that lies.
+    pub map_from_place: Pose2,
+    /// So far around, metres.
+    pub within_m: f64,
+}
+
+/// What equal particles would look at from place `t`: distance edges, semantic edges, where the robot was seen, and any
+/// place when it is lost. `followed` says which older places are already being followed.
 pub fn propose(
     config: &Config,
-    graph: &Graph,
-    structure: &Structure,
+    (graph, structure, pointed_at): (&Graph, &Structure, Option<&PointedAt>),
     particle: &Particle,
     t: Vertex,
     followed: impl Fn(&Belief, Vertex) -> bool,
@@ -104,6 +120,12 @@ pub fn propose(
             probability: distance_probability(r, config.gamma_per_m2),
         })
         .collect();
+    if let Some(at) = pointed_at.filter(|at| at.place <= t && !graph.apart(at.place, t, POINTED_AT_PATH_M)) {
+        let here = at.map_from_place.compose(&graph.chained(at.place, t));
+        let is_there = |i: &Vertex| belief.pose(*i).distance_m(&here) < at.within_m + NEAR_M;
+        let looked_at = |i| Proposal { i, kind: EdgeKind::Relocalisation, probability: POINTED_AT_P };
+        proposals.extend(older.clone().filter(is_there).map(looked_at));
+    }
     if lost {
         let before_break = (0..t).rev().find(|&i| graph.place(i).segment != graph.place(t).segment);
         let stayed = |i| before_break.is_some_and(|b| !graph.apart(i, b, STAYED_PATH_M));
@@ -113,12 +135,19 @@ pub fn propose(
             probability: if stayed(i) { STAYED_P } else { RELOCALISATION_P },
         }));
     }
+    likeliest(&mut proposals);
     if config.semantic_edges {
         // Names are given to places not frozen yet, too; those have nothing to match.
         let matchable = |i| i < t && graph.apart(i, t, LOCAL_PATH_M);
         merge_semantic(&mut proposals, particle.labels.similar(t), matchable);
     }
     draw(config.seed, graph, t, config.particles, proposals)
+}
+
+/// Of each place once, as likely as anything has it.
+fn likeliest(proposals: &mut Vec<Proposal>) {
+    proposals.sort_by(|a, b| a.i.cmp(&b.i).then(b.probability.total_cmp(&a.probability)));
+    proposals.dedup_by_key(|p| p.i);
 }
 
 /// What equal particles would look at for the names of a place, wherever the robot is now: any other
@@ -186,7 +215,6 @@ pub fn draw(seed: u64, graph: &Graph, t: Vertex, count: u32, proposals: Vec<Prop
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pose2;
     use nalgebra::{Matrix3, Vector3};
 
     fn relative(x_m: f64, y_m: f64, yaw_rad: f64, sigma: [f64; 2]) -> Relative {

@@ -45,6 +45,15 @@ pub enum Claim {
         /// Whether it is said to have been seen before.
         before: bool,
     },
+    /// "The robot is here", pointed out in the map.
+    At {
+        /// Where the robot was then.
+        place: Vertex,
+        /// Where that place is said to lie.
+        map_from_place: Pose2,
+        /// Standard deviations: metres in each direction, radians.
+        sigma: [f64; 2],
+    },
     /// "The gym is down the hall": how well that fits is the particle's own, see
     /// [`Labels::described`](crate::filter::labels::Labels::described).
     Located {
@@ -57,9 +66,10 @@ impl Claim {
     /// The places that it speaks of by their number.
     pub fn places(&self) -> impl Iterator<Item = Vertex> {
         let (a, b) = match *self {
-            Self::Called { place, .. } | Self::Denied { place, .. } | Self::Visited { place, .. } => {
-                (Some(place), None)
-            }
+            Self::Called { place, .. }
+            | Self::Denied { place, .. }
+            | Self::Visited { place, .. }
+            | Self::At { place, .. } => (Some(place), None),
             Self::One { a, b, .. } => (Some(a), Some(b)),
             Self::Located { .. } => (None, None),
         };
@@ -70,7 +80,7 @@ impl Claim {
     pub fn name(&self) -> Option<LabelId> {
         match *self {
             Self::Called { said, .. } | Self::Denied { said, .. } | Self::Located { said } => Some(said),
-            Self::One { .. } | Self::Visited { .. } => None,
+            Self::One { .. } | Self::Visited { .. } | Self::At { .. } => None,
         }
     }
 }
@@ -92,6 +102,13 @@ pub struct Testimony {
     pub utterance: u32,
     /// All ways to read it that claim anything.
     pub readings: Vec<Claims>,
+}
+
+impl Testimony {
+    /// Whether it points out where the robot is, and is no talk.
+    pub fn is_pose(&self) -> bool {
+        self.readings.iter().flat_map(|r| &r.claims).any(|(_, claim)| matches!(claim, Claim::At { .. }))
+    }
 }
 
 /// Where a place lies that was not in the graph when it was spoken of.

@@ -15,11 +15,13 @@ use crate::filter::naming::{
     BASE, BaseMeasure, Near, REACH_M, Site, Support, Tally, share, share_between, unless_false,
 };
 use crate::filter::particle::Particle;
+use crate::geometry::Pose2;
 use crate::graph::stretches::Stretch;
 use crate::language::act::Sameness;
 use crate::talk::Talk;
 use crate::talk::claims::{Claim, Claims, Testimony};
 use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
 
 /// How often two places spoken of lie in one room by chance: a room of some floor.
 const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
@@ -36,6 +38,8 @@ const VISITED_BACK: Vertex = 12;
 /// Sentences that are weighed anew in each map; what was said before them is taken as said, so that the time for one more
 /// is bounded.
 const WEIGHED_MAX: usize = 1000;
+/// Floor on which a robot may be, when somebody points out where it is: a building's.
+const SITE_M2: f64 = 5000.0;
 /// Two successive places are hardly farther apart.
 const SPACING_MAX_M: f64 = 2.0;
 
@@ -205,6 +209,9 @@ impl<'a> Fold<'a> {
 
     fn hear(&mut self, testimony: &Testimony, units: &[Units]) {
         self.mentioned.extend(self.talk.names(testimony));
+        if testimony.is_pose() {
+            return;
+        }
         self.spoken_at.insert(self.talk.ledger.entries()[testimony.utterance as usize].held);
         for Units { place, label, tally } in units {
             let Some(&site) = self.numbers.get(place) else { continue };
@@ -255,6 +262,7 @@ impl<'a> Fold<'a> {
             Claim::Denied { place, said } => self.denied(utterance, (place, said)),
             Claim::One { a, b, same } => self.one(a, b, same),
             Claim::Visited { place, before } => self.visited(place, before),
+            Claim::At { place, map_from_place, sigma } => self.at(place, &map_from_place, sigma),
             Claim::Located { said } => match self.talk.meant(utterance, said) {
                 Some(_) => unless_false(self.particle.labels.described(utterance, said)),
                 None => 1.0,
@@ -317,6 +325,17 @@ impl<'a> Fold<'a> {
         let at = |v| site(self.talk, &self.floors, self.particle, v);
         let (Some(a), Some(b)) = (at(a), at(b)) else { return 1.0 };
         so(share_between(&a, &b), ONE_BY_CHANCE, same)
+    }
+
+    /// "The robot is here": its density there, over that anywhere in the building. What nothing ties to where the map
+    /// began may be anywhere.
+    fn at(&self, place: Vertex, told: &Pose2, [sigma_m, sigma_rad]: [f64; 2]) -> f64 {
+        let site = site(self.talk, &self.floors, self.particle, place);
+        let Some(here) = site.filter(|site| site.floor == self.floors.floor(0)) else { return 1.0 };
+        let (off_m, turned_rad) = (told.distance_m(&here.pose), told.between(&here.pose).yaw_rad);
+        let d2 = (off_m / sigma_m).powi(2) + (turned_rad / sigma_rad).powi(2);
+        let peak = SITE_M2 / (TAU * sigma_m * sigma_m) * (TAU.sqrt() / sigma_rad);
+        unless_false(peak * (-0.5 * d2).exp())
     }
 
     /// "We have been here before".

@@ -5,6 +5,7 @@
 //!                                  describe ─▶ labels: grounded when said, and again as the map grows
 //!            └ doubts ─▶ questions ─▶ "yes": taken in
 //! "no, …", undo ─ mend ─▶ the same taken back
+//! where the robot is, pointed out ─ told ─▶ ledger, claims
 //! ledger, claims, one particle's map ─ fold ─▶ p(λ | G)
 //! ```
 
@@ -19,10 +20,11 @@ mod mend;
 pub mod questions;
 mod replied;
 mod take_in;
+mod told;
 
 use crate::edge::Vertex;
 use crate::effects::Heard;
-use crate::event::{Command, Utterance};
+use crate::event::{Command, StampNs, Told, Utterance};
 use crate::filter::Filter;
 use crate::filter::particle::Particle;
 use crate::filter::words::Words;
@@ -90,6 +92,17 @@ impl Talk {
         let done = mend::mend(self, filter, command);
         filter.weigh_words(self);
         done
+    }
+
+    /// Takes in where somebody sees the robot, and tells how the map has it so far, or why it can't be taken in.
+    pub fn tell(
+        &mut self,
+        filter: &mut Filter,
+        told: (&Told, StampNs),
+        body_from_place: &Pose2,
+        here: &Here,
+    ) -> Result<String, String> {
+        told::tell(self, filter, told, body_from_place, here)
     }
 
     /// Grounds some descriptions again, one after the other in turn, in the map as it is now.

@@ -4,7 +4,7 @@
 use crate::world::{laser, scan};
 use std::f64::consts::PI;
 use toponym_core::effects::{Effect, TrackState};
-use toponym_core::event::{Event, Laser, Odom, Setup};
+use toponym_core::event::{Command, Event, Laser, Odom, Setup, Told};
 use toponym_core::geometry::Pose2;
 use toponym_core::{Config, Mapper};
 
@@ -136,6 +136,43 @@ fn doubt_comes_where_halls_look_alike() {
     // One graph may be left over while all say that the robot is lost in it.
     assert!(told.iter().all(|(weights, maps)| weights[0] < 0.99 || !maps), "none is assured: {told:?}");
     assert!(best.iter().sum::<f64>() / (best.len() as f64) < 0.95, "{best:?}");
+}
+
+/// Somebody sees in which hall the robot is, and points at it.
+#[test]
+fn who_points_at_the_robot_tells_the_halls_apart_and_may_take_it_back() {
+    for (slip, y_m) in SLIPS.iter().flat_map(|&slip| [(slip, 0.0), (slip, APART_M)]) {
+        let (poses, mut mapper) = (drive(y_m, 8.0), Mapper::new(Config::default()));
+        let mut all = events(&poses, slip);
+        // Two for each pose: a metre and a half are left.
+        let rest = all.split_off(all.len() - 14);
+        for event in all {
+            mapper.step(event);
+        }
+        let weights = |mapper: &Mapper| -> Vec<f64> {
+            mapper.snapshot().graph().particles.iter().map(|p| p.weight).collect()
+        };
+        let before = weights(&mapper);
+        let told = |id: &str, y_m: f64| {
+            let there = Pose2 { y_m, ..poses[poses.len() - 8] };
+            let map_from_body = poses[0].between(&there);
+            Event::Command(Command::Pose(Told { id: id.into(), map_from_body, sigma_m: 0.5, sigma_rad: 0.2 }))
+        };
+        mapper.step(told("wrong", APART_M - y_m));
+        mapper.step(Event::Command(Command::Undo { utterance: Some("wrong".into()) }));
+        let after = weights(&mapper);
+        assert!(
+            before.len() == after.len() && before.iter().zip(&after).all(|(a, b)| (a - b).abs() < 1e-9),
+            "{before:?} {after:?}"
+        );
+        mapper.step(told("right", y_m));
+        for event in rest {
+            mapper.step(event);
+        }
+        let truth = poses[0].between(&poses[poses.len() - 1]);
+        let at = mapper.snapshot().robot().expect("it is in the map");
+        assert!(at.distance_m(&truth) < 1.0, "slip {slip}, hall {y_m}: at {at:?}, truly {truth:?}");
+    }
 }
 
 /// … and join where something does.

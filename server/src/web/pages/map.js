@@ -7,6 +7,10 @@ import { Drawing } from "./drawing.js";
 const REFRESH_MS = 5000;
 /** … and rooms and the graph, which are whole, only so often, unless something was said or the map jumped. */
 const WHOLE_MS = 60_000;
+/** Then so soon. */
+const SOON_MS = 200;
+/** A name that was just said is shown once the robot has seen the room that it is in. */
+const NAMES_MS = 30_000;
 
 const at = (id) => document.getElementById(id);
 const drawing = new Drawing(at("canvas"));
@@ -17,6 +21,7 @@ let due = null;
 let refreshing = false;
 let stale = false;
 let wholeAt = 0;
+let namesUntil = 0;
 let choice = 0;
 let sentences = new Map();
 
@@ -35,14 +40,16 @@ async function refresh() {
   }
   const id = map;
   [refreshing, stale] = [true, false];
+  let failed = false;
   try {
-    const whole = Date.now() - wholeAt > WHOLE_MS;
+    const whole = Date.now() - wholeAt > WHOLE_MS || Date.now() < namesUntil;
+    // What changes from here on is for the next time.
+    if (whole) wholeAt = Date.now();
     const none = Promise.resolve(null);
     const [tiles, rooms, graph] = await Promise.all([ask(`/map/${id}/tiles`),
       whole ? ask(`/map/${id}/ask/regions`) : none, whole ? ask(`/map/${id}/ask/graph`) : none]);
     if (id !== map) return;
     if (whole) {
-      wholeAt = Date.now();
       drawing.graph = graph;
       drawing.trail = [];
       drawing.setRegions(rooms.regions);
@@ -55,29 +62,32 @@ async function refresh() {
     at("empty").hidden = tiles.tiles.length > 0;
     if (!shown && tiles.tiles.length) {
       shown = true;
+      at("view").setAttribute("aria-busy", false);
       drawing.fit();
     }
   } catch (error) {
     at("connection").textContent = error.message;
-    stale = true;
+    [stale, failed, wholeAt] = [true, true, 0];
   } finally {
     refreshing = false;
-    if (stale || id !== map) changed();
+    if (stale || id !== map) changed(wholeAt || failed ? undefined : SOON_MS);
   }
 }
 
-/** More than walls has changed. */
+/** More than walls has changed: that is looked for by somebody. */
 function changedWhole() {
   wholeAt = 0;
-  changed();
+  clearTimeout(due);
+  due = null;
+  changed(SOON_MS);
 }
 
 /** The map has changed: it is fetched soon, and not too often. */
-function changed() {
+function changed(wait = shown ? REFRESH_MS : SOON_MS) {
   due ??= setTimeout(() => {
     due = null;
     refresh();
-  }, shown ? REFRESH_MS : 100);
+  }, wait);
 }
 
 function robotAt() {
@@ -293,6 +303,7 @@ async function findMaps() {
 function open(id) {
   map = id;
   shown = false;
+  at("view").setAttribute("aria-busy", true);
   choice++;
   at("room").hidden = at("answer").hidden = true;
   drawing.setRegions([]);
@@ -323,7 +334,11 @@ listen({
     if (id === map) changed();
     else if (![...at("map").options].some((option) => option.value === id)) findMaps().catch(() => {});
   },
-  heard: changedWhole,
+  heard: () => {
+    namesUntil = Date.now() + NAMES_MS;
+    changedWhole();
+  },
+  mended: ({ map: id }) => id === map && changedWhole(),
   jump: changedWhole,
   missed: changedWhole,
 }, (is) => {

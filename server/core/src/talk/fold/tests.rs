@@ -92,6 +92,19 @@ fn a_name_speaks_for_the_map_in_which_it_was_said_nearby() {
 }
 
 #[test]
+fn where_somebody_sees_the_robot_speaks_for_the_maps_that_have_it_there() {
+    let at = |off_m: f64| {
+        let map_from_place = Pose2::new(25.0 + off_m, 0.0, 0.0);
+        third(25.0, Claim::At { place: 2, map_from_place, sigma: [0.5, 0.26] })
+    };
+    // One place in so many of a building's floor, and of its headings.
+    let peak = SITE_M2 / (TAU * 0.25) * TAU.sqrt() / 0.26;
+    assert!((at(0.0) - unless_false(peak).ln()).abs() < 1e-9);
+    assert!((at(0.5) - unless_false(peak * (-0.5_f64).exp()).ln()).abs() < 1e-9);
+    assert!((at(20.0) - FALSE_TALK.ln()).abs() < 1e-9, "the finger may err");
+}
+
+#[test]
 fn the_same_again_and_another_one_say_opposite_things() {
     assert!(gym(1.0, Sameness::Same) > 3.0);
     // Another of its kind may be meant.
