@@ -10,7 +10,7 @@ use toponym_ros::msg::{
     PoseWithCovarianceStamped, StringMsg, TFMessage, TriggerResponse, WhereRequest, WhereResponse,
 };
 use toponym_ros::plan::kind;
-use toponym_ros::wire::{Node, Qos, Role, attached, attachment, gid, key, publisher_of};
+use toponym_ros::wire::{Hashes, Node, Qos, Role, attached, attachment, gid, key, publisher_of};
 use toponym_ros::{cdr, log};
 
 fn read(path: &Path) -> (Vec<Message>, Notes) {
@@ -126,6 +126,7 @@ fn keys_tokens_and_attachments_are_those_of_others() {
         let number = |field: &str| entry[field].as_u64().unwrap() as u32;
         let node = Node {
             domain: number("domain"),
+            hashes: Hashes::in_key(&text("key")),
             zid: text("zid"),
             id: number("node_id"),
             namespace: text("namespace"),
@@ -147,7 +148,7 @@ fn keys_tokens_and_attachments_are_those_of_others() {
         let (name, kind) = (text("name"), text("type"));
         let hash = text("type_hash");
         assert_eq!(key(node.domain, &name, &kind, &hash), text("key"));
-        let known = toponym_ros::wire::hash(&kind);
+        let known = node.hashes.of(&kind);
         let qos = match text("qos_text").as_str() {
             "2::,5:,:,:,," => Qos::BestEffort(5),
             ":1:,1:,:,:,," => Qos::Latched,

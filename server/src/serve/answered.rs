@@ -82,6 +82,8 @@ impl Answered {
             lock(&self.waits).asked += 1;
             return (snapshot.clone(), answer.clone());
         }
+        // What is told of a robot that is lost, or found, is another thing.
+        let before = before.filter(|(from, _)| from.state() == snapshot.state());
         let before = before.and_then(|(from, slot)| Some((from, slot.answer.get()?.clone())));
         if let Some((from, answer)) = before
             && (from.says_the_same(snapshot) || !lock(&self.waits).more())

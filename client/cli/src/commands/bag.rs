@@ -36,7 +36,7 @@ pub fn bag(args: &BagArgs) -> Result<u8, Failure> {
     let why = |e: String| io::Error::other(format!("{}: {e}", args.bag.display()));
     let (mut bag, mut as_ros) = (BagWriter::new(BufWriter::new(file)).map_err(why)?, AsRos::default());
     let mut count = 0;
-    while let Some(record) = log.next() {
+    for record in log.by_ref() {
         let at = match &record.message {
             Message::Say(say) => say.began,
             _ => None,
