@@ -30,6 +30,8 @@ const STAYED_P: f64 = 0.9;
 const STAYED_PATH_M: f64 = 3.0;
 /// Probability of an edge to a place where somebody saw the robot …
 const POINTED_AT_P: f64 = 0.9;
+/// … less so beside it, as a Gaussian whose deviation is this and how well it was seen, …
+const POINTED_AT_M: f64 = 1.5;
 /// … so far along the path since.
 const POINTED_AT_PATH_M: f64 = 15.0;
 /// Similarities below are chance.
@@ -82,7 +84,7 @@ pub struct PointedAt {
     pub place: Vertex,
     /// Where that lies.
     pub map_from_place: Pose2,
-    /// So far around, metres.
+    /// Standard deviation in each direction, metres.
     pub within_m: f64,
 }
 
@@ -122,9 +124,12 @@ pub fn propose(
         .collect();
     if let Some(at) = pointed_at.filter(|at| at.place <= t && !graph.apart(at.place, t, POINTED_AT_PATH_M)) {
         let here = at.map_from_place.compose(&graph.chained(at.place, t));
-        let is_there = |i: &Vertex| belief.pose(*i).distance_m(&here) < at.within_m + NEAR_M;
-        let looked_at = |i| Proposal { i, kind: EdgeKind::Relocalisation, probability: POINTED_AT_P };
-        proposals.extend(older.clone().filter(is_there).map(looked_at));
+        let looked_at = |i| {
+            let off = belief.pose(i).distance_m(&here) / (at.within_m + POINTED_AT_M);
+            let probability = POINTED_AT_P * (-0.5 * off * off).exp();
+            Proposal { i, kind: EdgeKind::Relocalisation, probability }
+        };
+        proposals.extend(older.clone().map(looked_at).filter(|p| p.probability > SIMILARITY_MIN));
     }
     if lost {
         let before_break = (0..t).rev().find(|&i| graph.place(i).segment != graph.place(t).segment);
