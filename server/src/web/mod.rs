@@ -40,6 +40,7 @@ use std::sync::Arc;
 use std::time::Duration;
 use tokio::net::TcpListener;
 use tokio::task::JoinHandle;
+use tower_http::compression::{CompressionLayer, CompressionLevel};
 use tracing::{error, warn};
 
 /// A request's head comes within this.
@@ -145,5 +146,7 @@ fn routes(web: Arc<Web>) -> Router {
         .fallback(api::nothing)
         .method_not_allowed_fallback(api::other_method)
         .layer(from_fn_with_state(web.clone(), guard::guard))
+        // Pages ask anew all day. Pictures and events go as they are.
+        .layer(CompressionLayer::new().quality(CompressionLevel::Fastest))
         .with_state(web)
 }

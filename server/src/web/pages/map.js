@@ -45,17 +45,11 @@ async function refresh() {
     const whole = Date.now() - wholeAt > WHOLE_MS || Date.now() < namesUntil;
     // What changes from here on is for the next time.
     if (whole) wholeAt = Date.now();
-    const none = Promise.resolve(null);
-    const [tiles, rooms, graph] = await Promise.all([ask(`/map/${id}/tiles`),
-      whole ? ask(`/map/${id}/ask/regions`) : none, whole ? ask(`/map/${id}/ask/graph`) : none]);
+    const asked = whole ? Promise.all([ask(`/map/${id}/ask/regions`), ask(`/map/${id}/ask/graph`)]) : null;
+    // It may fail while walls are still awaited.
+    asked?.catch(() => {});
+    const tiles = await ask(`/map/${id}/tiles`);
     if (id !== map) return;
-    if (whole) {
-      drawing.graph = graph;
-      drawing.trail = [];
-      drawing.setRegions(rooms.regions);
-      list(rooms.regions);
-      tellDoubt(graph);
-    }
     await drawing.take(tiles, (x, y, hash) => tile(id, x, y, hash));
     if (id !== map) return;
     at("connection").textContent = "";
@@ -65,6 +59,18 @@ async function refresh() {
       at("view").setAttribute("aria-busy", false);
       drawing.fit();
     }
+    if (!asked) return;
+    // Walls are there first: to find rooms takes longer.
+    const [rooms, graph] = await asked;
+    if (id !== map) return;
+    const isFirst = !drawing.graph;
+    drawing.graph = graph;
+    drawing.trail = [];
+    drawing.setRegions(rooms.regions);
+    list(rooms.regions);
+    tellDoubt(graph);
+    if (isFirst) drawing.fit();
+    else drawing.draw();
   } catch (error) {
     at("connection").textContent = error.message;
     [stale, failed, wholeAt] = [true, true, 0];
