@@ -7,6 +7,7 @@ use std::sync::{Arc, Mutex, OnceLock};
 use toponym_core::Snapshot;
 use toponym_core::answers::query::WhereAnswer;
 
+use super::aside;
 use super::board::lock;
 
 /// Questions whose answers are kept; beyond, each is reckoned anew.
@@ -90,7 +91,7 @@ impl Answered {
         {
             if !slot.begun.swap(true, Ordering::Relaxed) {
                 let (snapshot, text, lang) = (snapshot.clone(), text.to_owned(), lang.map(str::to_owned));
-                rayon::spawn(move || {
+                aside::ahead(move || {
                     slot.answer.get_or_init(|| snapshot.where_is(&text, lang.as_deref()));
                 });
             }

@@ -2,6 +2,7 @@
 //! it. Nobody waits here for the filter.
 
 use arc_swap::ArcSwap;
+use axum::body::Bytes;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicI64, AtomicU64, AtomicUsize, Ordering};
@@ -17,6 +18,7 @@ use toponym_proto::{Keys, Stamp};
 use super::answered::Answered;
 use super::door::Arrival;
 use super::scribe::Work;
+use super::written::Written;
 use crate::fold::Card;
 use crate::web::{LAST_EVENT, Published};
 
@@ -40,6 +42,10 @@ pub struct MapView {
     pub snapshot: ArcSwap<Snapshot>,
     /// What was answered from it.
     pub answered: Answered,
+    /// Long answers.
+    pub written: Written,
+    /// Whether its graph is about to be published.
+    pub graph_waits: AtomicBool,
     /// Newest stamp in it, ns.
     pub stamp_ns: AtomicI64,
     /// (boot, seq) of the last of its robot's messages that is on disk, or given up.
@@ -93,6 +99,8 @@ impl MapView {
             robot: card.robot.clone(),
             snapshot: ArcSwap::new(snapshot),
             answered: Answered::default(),
+            written: Written::default(),
+            graph_waits: AtomicBool::new(false),
             stamp_ns: AtomicI64::new(card.stamp_ns),
             durable: Mutex::new(durable),
             backlog_bytes: AtomicUsize::new(0),
@@ -147,7 +155,7 @@ pub struct Board {
     /// The robots that were heard.
     pub robots: Mutex<BTreeMap<String, RobotState>>,
     /// What was last published on a key, for those who come later.
-    pub latest: Mutex<BTreeMap<String, Vec<u8>>>,
+    pub latest: Mutex<BTreeMap<String, Bytes>>,
     /// How often each limit was reached.
     pub reached: Mutex<BTreeMap<&'static str, u64>>,
     /// Messages dropped at the door because the server could not keep up.
@@ -195,7 +203,7 @@ impl Board {
     pub fn leave(&self) {
         self.stopped.store(true, Ordering::Release);
         let _ =
-            self.events.send(Arc::new(Published { name: LAST_EVENT, json: Vec::new(), of: String::new() }));
+            self.events.send(Arc::new(Published { name: LAST_EVENT, json: Bytes::new(), of: String::new() }));
     }
 
     /// Counts that a limit was reached.

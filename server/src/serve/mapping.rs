@@ -249,7 +249,7 @@ impl Mapping {
                     covariance: convert::covariance(&covariance),
                     state: convert::pose_state(state),
                 };
-                self.outbox.stream(keys.pose(robot), &pose);
+                self.outbox.pose(&pose);
             }
             Effect::Jumped { epoch, new_from_old } => {
                 info!(map, epoch, "coordinates jumped");

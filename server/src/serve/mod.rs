@@ -16,6 +16,7 @@
 mod answered;
 pub mod args;
 mod arguments;
+pub mod aside;
 pub mod board;
 mod commands;
 pub mod door;
@@ -32,6 +33,7 @@ mod robot;
 mod saver;
 pub mod scribe;
 pub mod watch;
+mod written;
 
 pub use args::{ServeArgs, run};
 pub use log::{LogFormat, init_logging};
@@ -285,6 +287,7 @@ async fn answer_queries(session: &Session, board: &Arc<Board>, limits: &Limits) 
             if let Some(permit) = permits.take(query.key_expr().as_str()) {
                 let board = board.clone();
                 runtime.spawn_blocking(move || {
+                    aside::give_way();
                     reply_to(&board, &query);
                     drop(permit);
                 });

@@ -1,15 +1,19 @@
 //! Everything published goes through one bounded queue and one thread, so that a client that does
 //! not read can't hold up a map.
 
+use axum::body::Bytes;
 use serde::Serialize;
 use std::sync::Arc;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
 use std::thread::JoinHandle;
+use toponym_proto::answer::PoseOut;
 use toponym_proto::codec::ENCODING_JSON;
 use tracing::{debug, error, warn};
 use zenoh::qos::{CongestionControl, Priority};
 use zenoh::{Session, Wait};
 
+use super::aside;
 use super::board::{Board, MapView, lock};
 use super::queries;
 use crate::web::Published;
@@ -18,8 +22,7 @@ use crate::web::Published;
 const QUEUE: usize = 1024;
 
 enum Parcel {
-    Payload { key: String, json: Vec<u8>, prompt: bool },
-    Graph(Arc<MapView>),
+    Payload { key: String, json: Bytes, prompt: bool },
     Stop,
 }
 
@@ -27,6 +30,7 @@ enum Parcel {
 #[derive(Clone)]
 pub struct Outbox {
     board: Arc<Board>,
+    session: Session,
     queue: SyncSender<Parcel>,
 }
 
@@ -34,16 +38,20 @@ impl Outbox {
     /// Starts the thread that publishes.
     pub fn start(board: Arc<Board>, session: Session) -> std::io::Result<(Self, JoinHandle<()>)> {
         let (queue, parcels) = sync_channel(QUEUE);
-        let outbox = Self { board: board.clone(), queue };
+        let outbox = Self { board: board.clone(), session: session.clone(), queue };
         let thread = std::thread::Builder::new()
             .name("publish".into())
             .spawn(move || publish_all(&board, &session, &parcels))?;
         Ok((outbox, thread))
     }
 
-    /// What the next supersedes (poses): dropped where the network can't follow.
-    pub fn stream<T: Serialize>(&self, key: String, value: &T) {
-        if let Some(json) = self.keep(&key, value)
+    /// What the next supersedes: dropped where the network can't follow.
+    pub fn pose(&self, pose: &PoseOut) {
+        if self.board.events.receiver_count() > 0 {
+            let _ = self.board.events.send(Arc::new(Published::pose(pose)));
+        }
+        let key = self.board.keys.pose(&pose.robot);
+        if let Some(json) = self.keep(&key, pose)
             && let Err(TrySendError::Full(_)) =
                 self.queue.try_send(Parcel::Payload { key, json, prompt: false })
         {
@@ -66,9 +74,34 @@ impl Outbox {
         }
     }
 
-    /// The graph of a map as it is when its turn comes; false if there is no room now.
+    /// The graph of a map as it is when its turn comes; false if one is on its way. By another thread: poses do not wait for
+    /// it.
     pub fn graph(&self, map: &Arc<MapView>) -> bool {
-        self.queue.try_send(Parcel::Graph(map.clone())).is_ok()
+        if map.graph_waits.swap(true, Ordering::AcqRel) {
+            return false;
+        }
+        let (outbox, map) = (self.clone(), map.clone());
+        aside::ahead(move || {
+            map.graph_waits.store(false, Ordering::Release);
+            let key = outbox.board.keys.graph(&map.id);
+            match queries::graph(&map) {
+                Ok(reply) => {
+                    let identity = map.identity(&map.snapshot.load());
+                    let json = serde_json::to_vec(&identity).unwrap_or_default().into();
+                    // Nobody looking is no error.
+                    let _ = outbox.board.events.send(Arc::new(Published {
+                        name: "map",
+                        json,
+                        of: map.id.clone(),
+                    }));
+                    // Before one that is as long as many messages is dropped, Zenoh waits for who reads slowly: here, and
+                    // in a queue that is not that of poses.
+                    publish(&outbox.session, &key, reply.payload, Priority::Data, false);
+                }
+                Err(problem) => error!(map = map.id, "graph: {problem}"),
+            }
+        });
+        true
     }
 
     /// Ends the thread once all before is published.
@@ -76,62 +109,45 @@ impl Outbox {
         let _ = self.queue.send(Parcel::Stop);
     }
 
-    fn keep<T: Serialize>(&self, key: &str, value: &T) -> Option<Vec<u8>> {
+    fn keep<T: Serialize>(&self, key: &str, value: &T) -> Option<Bytes> {
         let json = written(key, value)?;
         lock(&self.board.latest).insert(key.into(), json.clone());
         Some(json)
     }
 }
 
-fn written<T: Serialize>(key: &str, value: &T) -> Option<Vec<u8>> {
-    serde_json::to_vec(value).inspect_err(|e| error!(key, "can't be written as JSON: {e}")).ok()
+fn written<T: Serialize>(key: &str, value: &T) -> Option<Bytes> {
+    let json = serde_json::to_vec(value).inspect_err(|e| error!(key, "can't be written as JSON: {e}"));
+    json.ok().map(Bytes::from)
 }
 
-/// Pages get the same, but of a map that has changed only that it has.
-fn tell_pages(board: &Board, key: &str, json: &[u8]) {
+/// Pages get the same, but poses.
+fn tell_pages(board: &Board, key: &str, json: &Bytes) {
     let chunks = board.keys.chunks(key).unwrap_or_default();
     let [_, of, "out", what] = chunks[..] else { return };
     let name = match what {
-        "pose" => "pose",
         "heard" => "heard",
         "state" => "state",
         "jump" => "jump",
-        "graph" => "map",
         _ => return,
     };
     // Nobody looking is no error.
-    let _ = board.events.send(Arc::new(Published { name, json: json.to_vec(), of: of.to_owned() }));
+    let _ = board.events.send(Arc::new(Published { name, json: json.clone(), of: of.to_owned() }));
 }
 
 fn publish_all(board: &Board, session: &Session, parcels: &Receiver<Parcel>) {
     while let Ok(parcel) = parcels.recv() {
-        let (key, json, prompt) = match parcel {
-            Parcel::Payload { key, json, prompt } => {
-                tell_pages(board, &key, &json);
-                (key, json, prompt)
-            }
-            Parcel::Graph(map) => match queries::graph(&map) {
-                Ok(json) => {
-                    let identity = map.identity(&map.snapshot.load());
-                    tell_pages(
-                        board,
-                        &board.keys.graph(&map.id),
-                        &serde_json::to_vec(&identity).unwrap_or_default(),
-                    );
-                    (board.keys.graph(&map.id), json, false)
-                }
-                Err(problem) => {
-                    error!(map = map.id, "graph: {problem}");
-                    continue;
-                }
-            },
-            Parcel::Stop => return,
-        };
-        // Nobody is waited for: a robot or guide whose connection is full asks or says again. Long answers, which wait,
-        // have another queue.
-        let put = session.put(&key, json).encoding(ENCODING_JSON).congestion_control(CongestionControl::Drop);
-        if let Err(e) = put.priority(Priority::DataHigh).express(prompt).wait() {
-            warn!(key, "could not be published: {e}");
-        }
+        let Parcel::Payload { key, json, prompt } = parcel else { return };
+        tell_pages(board, &key, &json);
+        publish(session, &key, json, Priority::DataHigh, prompt);
+    }
+}
+
+/// Nobody is waited for: a robot or guide whose connection is full asks or says again. Long answers, which wait, have
+/// another queue.
+fn publish(session: &Session, key: &str, json: Bytes, priority: Priority, prompt: bool) {
+    let put = session.put(key, json).encoding(ENCODING_JSON).congestion_control(CongestionControl::Drop);
+    if let Err(e) = put.priority(priority).express(prompt).wait() {
+        warn!(key, "could not be published: {e}");
     }
 }

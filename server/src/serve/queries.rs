@@ -1,12 +1,13 @@
 //! Questions: every query gets a reply, an error if need be. Answers come from the snapshot that a
 //! map shows, whatever its filter is doing.
 
+use axum::body::Bytes;
 use serde::Serialize;
 use std::sync::Arc;
 use std::time::{SystemTime, UNIX_EPOCH};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore};
-use toponym_core::{Answer, Query};
-use toponym_proto::answer::{ANSWER_VERSION, Clocks, ErrorCode, Problem, RobotState};
+use toponym_core::{Answer, Query, Snapshot};
+use toponym_proto::answer::{ANSWER_VERSION, Clocks, ErrorCode, MapIdentity, Problem, RobotState};
 use toponym_proto::codec::{ENCODING_JSON, ENCODING_PNG};
 use toponym_proto::keys::Ask;
 use toponym_proto::selector::{self, Arguments};
@@ -64,16 +65,18 @@ impl Permits {
 }
 
 /// An answer as it goes out.
+#[derive(Clone)]
 pub struct Reply {
-    /// Its bytes.
-    pub payload: Vec<u8>,
+    /// Its bytes, which many may share.
+    pub payload: Bytes,
     /// What they are.
     pub encoding: &'static str,
 }
 
 impl Reply {
-    fn json(payload: Vec<u8>) -> Self {
-        Self { payload, encoding: ENCODING_JSON }
+    /// One in JSON.
+    pub fn json(payload: Vec<u8>) -> Self {
+        Self { payload: payload.into(), encoding: ENCODING_JSON }
     }
 }
 
@@ -96,10 +99,11 @@ pub fn answer(board: &Board, key: &str, parameters: &str, payload: &[u8]) -> Res
         }
         ["map", id, "out", "graph"] => {
             let map = map(board, id)?;
-            graph(&map).map(Reply::json)
+            graph(&map)
         }
         ["robot" | "map", _, "out", _] => {
-            lock(&board.latest).get(key).cloned().map(Reply::json).ok_or_else(|| {
+            let told = lock(&board.latest).get(key).cloned();
+            told.map(|payload| Reply { payload, encoding: ENCODING_JSON }).ok_or_else(|| {
                 Problem::new(ErrorCode::NoSuchQuery, format!("nothing was published on {key} yet"))
             })
         }
@@ -136,7 +140,7 @@ pub fn json<T: Serialize>(value: &T) -> Result<Reply, Problem> {
 fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Reply, Problem> {
     let snapshot = map.snapshot.load_full();
     let identity = map.identity(&snapshot);
-    let query = match ask {
+    match ask {
         Ask::Where => {
             let [name, text, lang, robot] = take(arguments, ["name", "text", "lang", "robot"])?;
             check_robot(map, robot.as_deref())?;
@@ -144,7 +148,7 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Reply, 
             check_localised(&snapshot, (&text, lang.as_deref()), robot.is_some())?;
             let (from, answer) = map.answered.where_is(&snapshot, &text, lang.as_deref());
             let (answer, identity) = (understood(answer)?, map.identity(&from));
-            return json(&convert::where_reply(answer, identity, map.stamp(), &map.robot));
+            json(&convert::where_reply(answer, identity, map.stamp(), &map.robot))
         }
         Ask::Nearest => {
             let [name, text, lang, robot] = take(arguments, ["name", "text", "lang", "robot"])?;
@@ -153,45 +157,61 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Reply, 
             // It counts from the robot.
             check_localised(&snapshot, (&text, lang.as_deref()), true)?;
             let answer = understood(snapshot.nearest(&text, lang.as_deref()))?;
-            return json(&convert::nearest_reply(answer, identity, map.stamp(), &map.robot));
+            json(&convert::nearest_reply(answer, identity, map.stamp(), &map.robot))
         }
         Ask::What => {
             let [x_m, y_m, robot] = take(arguments, ["x_m", "y_m", "robot"])?;
             check_robot(map, robot.as_deref())?;
             let (x_m, y_m) = point(&snapshot, x_m, y_m)?;
-            return json(&convert::what_reply(snapshot.what(x_m, y_m), identity, map.stamp()));
+            json(&convert::what_reply(snapshot.what(x_m, y_m), identity, map.stamp()))
         }
-        Ask::Labels | Ask::Graph => {
+        Ask::Labels => {
             let [] = take(arguments, [])?;
-            if ask == Ask::Labels { Query::Labels } else { Query::Graph }
+            let Answer::Labels(labels) = snapshot.answer(&Query::Labels) else { return Err(other_answer()) };
+            json(&convert::labels_reply(labels, identity))
+        }
+        Ask::Graph => {
+            let [] = take(arguments, [])?;
+            map.written.of(&snapshot, "graph", || {
+                let Answer::Graph(graph) = snapshot.answer(&Query::Graph) else { return Err(other_answer()) };
+                json(&convert::graph_reply(graph, identity))
+            })
         }
         Ask::Regions => {
             let [] = take(arguments, [])?;
-            return json(&convert::regions_reply(&snapshot, identity));
+            map.written.of(&snapshot, "regions", || json(&convert::regions_reply(&snapshot, identity)))
         }
-        Ask::Grid => return grid(map, arguments),
-    };
-    match (ask, snapshot.answer(&query)) {
-        (Ask::Labels, Answer::Labels(a)) => json(&convert::labels_reply(a, identity)),
-        (Ask::Graph, Answer::Graph(a)) => json(&convert::graph_reply(a, identity)),
-        _ => Err(Problem::new(ErrorCode::Internal, "the map answered another question")),
+        Ask::Grid => {
+            let [resolution, format] = take(arguments, ["resolution_m", "format"])?;
+            let resolution_m = resolution.map_or(Ok(RESOLUTION_DEFAULT_M), |r| resolution_m(&r))?;
+            let what = format!("grid {resolution_m} {format:?}");
+            map.written.of(&snapshot, &what, || grid(&snapshot, resolution_m, format.as_deref(), identity))
+        }
     }
 }
 
+fn other_answer() -> Problem {
+    Problem::new(ErrorCode::Internal, "the map answered another question")
+}
+
 /// The grid of a map: as JSON, or as a picture alone.
-fn grid(map: &MapView, arguments: Arguments) -> Result<Reply, Problem> {
-    let [resolution, format] = take(arguments, ["resolution_m", "format"])?;
-    let resolution_m = resolution.map_or(Ok(RESOLUTION_DEFAULT_M), |r| resolution_m(&r))?;
-    let snapshot = map.snapshot.load_full();
-    let grid = snapshot.grid(resolution_m);
+fn grid(
+    snapshot: &Snapshot,
+    resolution_m: f64,
+    format: Option<&str>,
+    map: MapIdentity,
+) -> Result<Reply, Problem> {
     let internal = |e: Invalid| Problem::new(ErrorCode::Internal, e.to_string());
-    let reply = convert::grid_reply(&grid, map.identity(&snapshot)).map_err(internal)?;
-    match format.as_deref() {
+    let reply = convert::grid_reply(&snapshot.grid(resolution_m), map).map_err(internal)?;
+    match format {
         None | Some("json") => json(&reply),
         Some("png") if reply.png.is_empty() => {
             Err(Problem::new(ErrorCode::BadArgument, "the map has seen nothing to draw yet").field("format"))
         }
-        Some("png") => Ok(Reply { payload: reply.picture().map_err(internal)?, encoding: ENCODING_PNG }),
+        Some("png") => {
+            let payload = reply.picture().map_err(internal)?.into();
+            Ok(Reply { payload, encoding: ENCODING_PNG })
+        }
         Some(other) => Err(Problem::new(ErrorCode::BadArgument, format!("there is no format {other:?}"))
             .field("format")
             .hint("json or png")),
@@ -199,8 +219,8 @@ fn grid(map: &MapView, arguments: Arguments) -> Result<Reply, Problem> {
 }
 
 /// The graph of a map, as asked and as published.
-pub fn graph(map: &MapView) -> Result<Vec<u8>, Problem> {
-    answer_about(map, Ask::Graph, Arguments::new()).map(|reply| reply.payload)
+pub fn graph(map: &MapView) -> Result<Reply, Problem> {
+    answer_about(map, Ask::Graph, Arguments::new())
 }
 
 fn info(board: &Board, arguments: &Arguments) -> Result<Reply, Problem> {

@@ -4,6 +4,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use toponym_journal::{Folder, prune};
 
+use super::aside::give_way;
 use crate::fold::Fold;
 use crate::store::checkpoint;
 
@@ -41,6 +42,7 @@ impl Saver {
         // All structure is shared: a copy is a few reference counts and lists.
         let (fold, disk) = (fold.clone(), self.disk.clone());
         let write = move || {
+            give_way();
             let checkpoint = checkpoint(&fold, index).map_err(|e| e.to_string())?;
             drop(fold);
             checkpoint.write(&disk).and_then(|()| prune(&disk)).map_err(|e| e.to_string())

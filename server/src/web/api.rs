@@ -2,6 +2,7 @@
 
 use super::Web;
 use super::guard::Who;
+use crate::serve::aside;
 use crate::serve::queries::{self, Reply};
 use axum::body::{Body, to_bytes};
 use axum::extract::{Path, Request, State};
@@ -79,6 +80,7 @@ pub async fn answer(State(web): State<Arc<Web>>, uri: Uri) -> Response {
         return told(Problem::new(ErrorCode::Busy, "too many queries: try again"));
     };
     let answered = tokio::task::spawn_blocking(move || {
+        aside::give_way();
         let answered = queries::answer(&web.board, &key, &arguments, &[]);
         drop(permit);
         answered

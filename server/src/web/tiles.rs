@@ -2,6 +2,7 @@
 
 use super::Web;
 use super::api::refuse;
+use crate::serve::aside;
 use crate::serve::board::MapView;
 use axum::Json;
 use axum::extract::rejection::PathRejection;
@@ -72,7 +73,11 @@ impl Tiles {
         if let Some(known) = all.get(&view.id).filter(|tiled| tiled.map == map) {
             return Ok(known.clone());
         }
-        let made = spawn_blocking(move || Arc::new(Tiled::new(map, &snapshot))).await;
+        let made = spawn_blocking(move || {
+            aside::give_way();
+            Arc::new(Tiled::new(map, &snapshot))
+        })
+        .await;
         let tiled = made.map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))?;
         all.insert(view.id.clone(), tiled.clone());
         Ok(tiled)
