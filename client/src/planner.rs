@@ -112,7 +112,7 @@ impl Planner {
     }
 
     /// Mends what was said: takes a sentence back, as if it had never been said; gives a name its right
-    /// spelling; forgets a name; takes in where somebody sees the robot. Refused where there is nothing of the kind.
+    /// spelling; forgets a name; takes in where somebody sees the robot, or an area. Refused where there is nothing of the kind.
     pub async fn mend(&self, mend: &Mend) -> Result<Mended, ClientError> {
         let (command, mut arguments) = match mend {
             Mend::Undo { id } => ("undo", id.iter().map(|id| ("id", id.clone())).collect()),
@@ -128,6 +128,13 @@ impl Planner {
                 ];
                 let numbers = numbers.into_iter().map(|(name, value)| (name, value.to_string()));
                 ("initial_pose", numbers.chain([("id", id.clone())]).collect())
+            }
+            Mend::Area { id, polygon_m, name, instead, forbidden } => {
+                let corners: Vec<String> = polygon_m.iter().flatten().map(ToString::to_string).collect();
+                let flags = [("instead", *instead), ("forbidden", *forbidden)];
+                let told = [("id", id.clone()), ("polygon_m", corners.join(","))].into_iter();
+                let told = told.chain(name.iter().map(|name| ("name", name.clone())));
+                ("area", told.chain(flags.map(|(flag, set)| (flag, set.to_string()))).collect())
             }
         };
         arguments.push(("map", self.map.clone()));

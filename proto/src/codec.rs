@@ -288,11 +288,18 @@ mod tests {
         }
 
         #[test]
-        fn what_is_mended_survives_a_record(text in "[a-z ]{0,9}x", how in 0..3) {
+        fn what_is_mended_survives_a_record(text in "[a-z ]{0,9}x", how in 0..4) {
             use crate::stream::Mend;
             let m = Message::Mend(match how {
                 0 => Mend::Undo { id: Some(text) },
                 1 => Mend::Rename { from: text, to: "gym".into() },
+                2 => Mend::Area {
+                    id: "a".into(),
+                    polygon_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, -1e6]],
+                    name: Some(text),
+                    instead: false,
+                    forbidden: true,
+                },
                 _ => Mend::Forget { name: text },
             });
             let bytes = m.to_bincode().unwrap();

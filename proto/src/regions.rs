@@ -15,6 +15,22 @@ pub struct RegionsReply {
     pub map: MapIdentity,
     /// In the order of their ids.
     pub regions: Vec<Region>,
+    /// What was drawn at a desk and stands, oldest first.
+    #[serde(default)]
+    pub areas: Vec<Area>,
+}
+
+/// An area that somebody drew: `do/area`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Area {
+    /// By which `do/undo` takes it back.
+    pub id: String,
+    /// What it is called.
+    pub name: Option<String>,
+    /// Whether robots keep out.
+    pub forbidden: bool,
+    /// Its corners in the map.
+    pub polygon_m: Vec<[f64; 2]>,
 }
 
 /// A part of the map between narrowings of its free space.

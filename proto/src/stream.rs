@@ -188,7 +188,13 @@ pub struct Hearing {
     pub p: f64,
 }
 
-/// What an operator mends at a desk, by the queries `do/undo`, `do/rename`, `do/forget` and `do/initial_pose`.
+/// Who points at where a robot is, in a picture of the map, errs by so much, …
+pub const TOLD_SIGMA_M: f64 = 0.5;
+/// … and by so much of its heading: as RViz has it.
+pub const TOLD_SIGMA_RAD: f64 = 0.26;
+
+/// What an operator mends at a desk, by the queries `do/undo`, `do/rename`, `do/forget`, `do/initial_pose` and
+/// `do/area`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Mend {
@@ -219,6 +225,19 @@ pub enum Mend {
         sigma_m: f64,
         /// Standard deviation of the heading.
         sigma_rad: f64,
+    },
+    /// An area is called so, or robots keep out of it.
+    Area {
+        /// ULID; makes a resend harmless, and lets it be taken back.
+        id: String,
+        /// Its corners in the map, in their order either way round.
+        polygon_m: Vec<[f64; 2]>,
+        /// What it is called.
+        name: Option<String>,
+        /// Whether what was said to be there so far is not so.
+        instead: bool,
+        /// Whether robots keep out.
+        forbidden: bool,
     },
 }
 

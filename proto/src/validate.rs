@@ -1,8 +1,8 @@
 //! The only place that rejects.
 
 use crate::limits::{
-    AGO_MAX_S, ANGLE_MAX_RAD, BOOT_MAX, COORDINATE_MAX_M, Limits, RANGE_MAX_M, SEQ_MAX, STAMP_MAX_NS,
-    TIME_INCREMENT_MAX_S,
+    AGO_MAX_S, ANGLE_MAX_RAD, AREA_CORNERS_MAX, BOOT_MAX, COORDINATE_MAX_M, Limits, RANGE_MAX_M, SEQ_MAX,
+    STAMP_MAX_NS, TIME_INCREMENT_MAX_S,
 };
 use crate::stream::{Header, Laser, Mend, Message, Pose, Say, Scan, Setup, Stamp};
 use std::f64::consts::PI;
@@ -189,7 +189,27 @@ fn check_mend(mend: &Mend, limits: &Limits) -> Result<(), Invalid> {
             check_number("sigma_m", *sigma_m, SIGMA_MIN, SIGMA_MAX_M)?;
             check_number("sigma_rad", *sigma_rad, SIGMA_MIN, PI)
         }
+        Mend::Area { id, polygon_m, name, forbidden, .. } => {
+            check_token("id", id)?;
+            check_polygon("polygon_m", polygon_m)?;
+            match name {
+                Some(name) => check_text("name", name, limits),
+                None if *forbidden => Ok(()),
+                None => Err(Invalid::new("name", "is missing: an area has one, or is forbidden")),
+            }
+        }
     }
+}
+
+fn check_polygon(field: &str, corners: &[[f64; 2]]) -> Result<(), Invalid> {
+    if !(3..=AREA_CORNERS_MAX).contains(&corners.len()) {
+        let reason = format!("has {} corners, must have 3 to {AREA_CORNERS_MAX}", corners.len());
+        return Err(Invalid::new(field, reason));
+    }
+    for &coordinate in corners.iter().flatten() {
+        check_number(field, coordinate, -COORDINATE_MAX_M, COORDINATE_MAX_M)?;
+    }
+    Ok(())
 }
 
 fn check_token(field: &str, token: &str) -> Result<(), Invalid> {

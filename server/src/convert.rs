@@ -65,6 +65,10 @@ pub fn event(message: Message) -> Event {
                 let map_from_body = pose_in(&map_from_body);
                 event::Command::Pose(event::Told { id, map_from_body, sigma_m, sigma_rad })
             }
+            Mend::Area { id, polygon_m, name, instead, forbidden } => {
+                let polygon_m = polygon_m.into_iter().map(|[x, y]| (x, y)).collect();
+                event::Command::Area(event::Area { id, polygon_m, name, instead, forbidden })
+            }
         }),
     }
 }

@@ -123,6 +123,48 @@ fn restarted(message: &Message) -> Message {
     }
 }
 
+/// Somebody at a desk knows what a part of the map is called, and that robots keep out of it.
+#[tokio::test(flavor = "multi_thread")]
+async fn an_area_is_called_and_forbidden() {
+    let folder = Folder::new();
+    let site = mapped(&folder).await;
+    let pose: PoseOut = serde_json::from_value(site.ask(&site.keys.pose("r1"), "").await.unwrap()).unwrap();
+    let Pose { x_m, y_m, .. } = pose.map_from_body;
+    let drawn = |rest: &str| {
+        let corners =
+            format!("{},{},{},{},{},{}", x_m - 9.0, y_m - 9.0, x_m + 9.0, y_m - 9.0, x_m, y_m + 9.0);
+        format!("{}?polygon_m={corners};{rest}", site.keys.command("area"))
+    };
+    for told in ["id=a1;name=den", "id=a2;forbidden=true"] {
+        let mended: Mended = serde_json::from_value(site.ask(&drawn(told), "").await.unwrap()).unwrap();
+        assert!(mended.words.starts_with("the area about x"), "{mended:?}");
+    }
+    let json = site.ask(&site.keys.ask("main", Ask::Regions), "").await.unwrap();
+    let rooms: RegionsReply = serde_json::from_value(json).unwrap();
+    assert_eq!(
+        rooms.areas.iter().map(|a| (a.name.as_deref(), a.forbidden)).collect::<Vec<_>>(),
+        [(Some("den"), false), (None, true)]
+    );
+    assert!(rooms.regions[0].names.iter().any(|n| n.label == "den"), "{rooms:?}");
+    let sent: Sent =
+        serde_json::from_value(site.ask(&format!("{}?name=den", site.keys.command("go")), "").await.unwrap())
+            .unwrap();
+    assert_eq!(sent.goal, None, "robots keep out: {sent:?}");
+    for id in ["a2", "a1"] {
+        site.ask(&format!("{}?id={id}", site.keys.command("undo")), "").await.unwrap();
+    }
+    for wrong in [
+        "",
+        "polygon_m=0,0,4,0,4;name=x",
+        "polygon_m=0,0,4,0,4,4",
+        "polygon_m=0,0,4,0,4,4;name=x;forbidden=1",
+    ] {
+        let wrong = format!("{}?{wrong}", site.keys.command("area"));
+        assert_eq!(site.ask(&wrong, "").await.unwrap_err().code, ErrorCode::BadArgument, "{wrong}");
+    }
+    site.stop().await;
+}
+
 #[tokio::test(flavor = "multi_thread")]
 async fn who_is_lost_is_asked_where_things_are_but_not_how_far() {
     let folder = Folder::new();

@@ -85,12 +85,19 @@ pub fn messages() -> [Message; 5] {
 }
 
 /// One of each that an operator mends.
-pub fn mends() -> [Message; 3] {
+pub fn mends() -> [Message; 4] {
     let (from, to) = ("jim".to_owned(), "gym".to_owned());
     [
         Mend::Undo { id: Some("s1".into()) },
         Mend::Rename { from, to },
         Mend::Forget { name: "printer room".into() },
+        Mend::Area {
+            id: "a1".into(),
+            polygon_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, 3.0]],
+            name: None,
+            instead: false,
+            forbidden: true,
+        },
     ]
     .map(Message::Mend)
 }

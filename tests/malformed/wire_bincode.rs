@@ -282,9 +282,22 @@ fn sentences() -> Vec<Case> {
             "from",
         ),
         case("forget 1001 characters", mend(Mend::Forget { name: long }), Came::Invalid, "name"),
-        case("mend of kind 3", Fed::Message(vec![1, 6, 3, 0, 0, 0]), Came::Malformed, "not the bincode"),
+        case("mend of kind 5", Fed::Message(vec![1, 6, 5, 0, 0, 0]), Came::Malformed, "not the bincode"),
+        case(
+            "area of two corners",
+            mend(area(vec![[0.0, 0.0], [1.0, 0.0]], true)),
+            Came::Invalid,
+            "polygon_m",
+        ),
+        case("area of 1025", mend(area(vec![[0.0, 0.0]; 1025], true)), Came::Invalid, "polygon_m"),
+        case("area off the map", mend(area(vec![[f64::NAN, 0.0]; 3], true)), Came::Invalid, "polygon_m"),
+        case("area of nothing", mend(area(vec![[0.0, 0.0]; 3], false)), Came::Invalid, "name"),
     ]);
     rows
+}
+
+fn area(polygon_m: Vec<[f64; 2]>, forbidden: bool) -> Mend {
+    Mend::Area { id: "a".into(), polygon_m, name: None, instead: false, forbidden }
 }
 
 /// What does not belong on the key that it comes on.

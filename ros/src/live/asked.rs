@@ -19,6 +19,7 @@ use toponym::guide::sentence;
 use toponym::told::where_text;
 use toponym::{ClientError, Planner};
 use toponym_proto::answer::WhereReply;
+use toponym_proto::stream::{TOLD_SIGMA_M, TOLD_SIGMA_RAD};
 use toponym_proto::{Mend, Pose};
 use tracing::{info, warn};
 use zenoh::Session;
@@ -238,7 +239,7 @@ fn pointed_at(told: &PoseWithCovariance) -> Option<Mend> {
     Some(Mend::Pose {
         id: sentence("").id,
         map_from_body: on_floor(&isometry(&transform))?,
-        sigma_m: sigma(planar, 0.5).clamp(0.05, 100.0),
-        sigma_rad: sigma(heading, 0.26).clamp(0.02, 3.0),
+        sigma_m: sigma(planar, TOLD_SIGMA_M).clamp(0.05, 100.0),
+        sigma_rad: sigma(heading, TOLD_SIGMA_RAD).clamp(0.02, 3.0),
     })
 }

@@ -128,6 +128,21 @@ pub struct Told {
     pub sigma_rad: f64,
 }
 
+/// An area of the map, as somebody draws it at a desk.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Area {
+    /// Unique id; a second one with the same id changes nothing.
+    pub id: String,
+    /// Its corners in the map, metres, in their order either way round.
+    pub polygon_m: Vec<(f64, f64)>,
+    /// What it is called.
+    pub name: Option<String>,
+    /// Whether what was said to be there so far is not so.
+    pub instead: bool,
+    /// Whether robots are to keep out.
+    pub forbidden: bool,
+}
+
 /// What an operator mends at a desk.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Command {
@@ -150,4 +165,6 @@ pub enum Command {
     },
     /// Tells where the robot is: evidence, that can be taken back as a sentence can.
     Pose(Told),
+    /// Tells what an area is called, or that robots keep out of it; can be taken back, too.
+    Area(Area),
 }

@@ -15,6 +15,15 @@ pub fn wrap(angle_rad: f64) -> f64 {
     if a > PI { a - TAU } else { a }
 }
 
+/// Whether a point lies in a polygon, by how often a ray from it crosses the outline.
+pub fn is_inside(polygon: &[(f64, f64)], (x, y): (f64, f64)) -> bool {
+    let next = polygon.iter().skip(1).chain(polygon.first());
+    let crosses = |(a, b): &(&(f64, f64), &(f64, f64))| {
+        (a.1 > y) != (b.1 > y) && x < a.0 + (y - a.1) / (b.1 - a.1) * (b.0 - a.0)
+    };
+    polygon.iter().zip(next).filter(crosses).count() % 2 == 1
+}
+
 /// A rigid transform of the plane, or the pose of a body.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Pose2 {
@@ -146,6 +155,20 @@ mod tests {
 
     fn near(a: &Pose2, b: &Pose2) -> bool {
         a.distance_m(b) < 1e-9 && wrap(a.yaw_rad - b.yaw_rad).abs() < 1e-9
+    }
+
+    #[test]
+    fn inside_is_what_the_outline_surrounds() {
+        let mut angle = vec![(0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (1.0, 1.0), (1.0, 4.0), (0.0, 4.0)];
+        for _ in 0..2 {
+            for (point, inside) in
+                [((0.5, 3.0), true), ((3.0, 0.5), true), ((2.0, 2.0), false), ((-1.0, 0.5), false)]
+            {
+                assert_eq!(is_inside(&angle, point), inside, "{point:?}");
+            }
+            angle.reverse();
+        }
+        assert!(!is_inside(&[], (0.0, 0.0)));
     }
 
     proptest! {

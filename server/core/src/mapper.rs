@@ -72,7 +72,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 15 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 16 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
@@ -110,6 +110,7 @@ impl Mapper {
             Event::Scan(scan) => self.scan(scan, &mut effects),
             Event::Utterance(utterance) => self.hear(&utterance, &mut effects),
             Event::Command(Command::Pose(told)) => self.told(&told, &mut effects),
+            Event::Command(Command::Area(area)) => self.drawn(&area, &mut effects),
             Event::Command(command) => {
                 self.change(&mut effects, |filter, talk| vec![Effect::Mended(talk.mend(filter, &command))]);
                 self.stand(&mut effects);

@@ -2,11 +2,12 @@
 
 use super::{line, millimetres};
 use toponym_core::Snapshot;
+use toponym_core::answers::areas::AreaView;
 use toponym_core::answers::query::WhatAnswer;
 use toponym_core::regions::{self, Shape};
 use toponym_proto::Stamp;
 use toponym_proto::answer::{ANSWER_VERSION, Called, MapIdentity, WhatReply};
-use toponym_proto::regions::{Doorway, Region, RegionName, RegionsReply};
+use toponym_proto::regions::{Area, Doorway, Region, RegionName, RegionsReply};
 
 /// Answer of `ask/what`.
 pub fn what_reply(answer: WhatAnswer, map: MapIdentity, stamp: Stamp) -> WhatReply {
@@ -61,5 +62,8 @@ pub fn regions_reply(snapshot: &Snapshot, map: MapIdentity) -> RegionsReply {
     };
     let mut all: Vec<Region> = regions.iter().enumerate().map(entry).collect();
     all.sort_by_key(|r| r.id);
-    RegionsReply { v: ANSWER_VERSION, query: "regions".into(), map, regions: all }
+    let area =
+        |a: AreaView| Area { id: a.id, name: a.name, forbidden: a.forbidden, polygon_m: line(&a.polygon_m) };
+    let areas = snapshot.areas().into_iter().map(area).collect();
+    RegionsReply { v: ANSWER_VERSION, query: "regions".into(), map, regions: all, areas }
 }

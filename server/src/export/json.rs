@@ -10,12 +10,14 @@ pub fn map(snapshot: &Snapshot) -> Value {
     let places = snapshot.places();
     let place = |p: &toponym_core::answers::query::PlaceView| json!({"id": p.id, "stamp_ns": p.stamp_ns, "x_m": p.pose.x_m, "y_m": p.pose.y_m, "yaw_rad": p.pose.yaw_rad});
     let sentences = snapshot.sentences();
+    let rooms = regions_reply(snapshot, MapIdentity::default());
     let sentence = |s: &toponym_core::answers::constraints::Sentence| json!({"id": s.id, "stamp_ns": s.stamp_ns, "text": s.text, "stands": s.stands});
     json!({
         "$schema": "map.schema.json",
         "version": 1,
         "places": places.iter().map(place).collect::<Vec<_>>(),
-        "regions": regions_reply(snapshot, MapIdentity::default()).regions,
+        "regions": rooms.regions,
+        "areas": rooms.areas,
         "names": labels_reply(snapshot.labels(), MapIdentity::default()).labels,
         "sentences": sentences.iter().map(sentence).collect::<Vec<_>>(),
         "unresolved": snapshot.unresolved(),
@@ -58,6 +60,10 @@ pub fn schema() -> Value {
             "places": list(&id),
         }),
     );
+    let area = object(
+        &["id", "name", "forbidden", "polygon_m"],
+        &json!({"id": text, "name": {"type": ["string", "null"]}, "forbidden": {"type": "boolean"}, "polygon_m": list(&point)}),
+    );
     let name = object(
         &["label", "shown", "utterances", "region"],
         &json!({"label": text, "shown": text, "utterances": id, "region": id}),
@@ -72,6 +78,7 @@ pub fn schema() -> Value {
             "version": {"const": 1},
             "places": list(&place),
             "regions": list(&region),
+            "areas": list(&area),
             "names": list(&name),
             "sentences": list(&sentence),
             "unresolved": probability,

@@ -2,6 +2,7 @@
 //!
 //! ```text
 //! Snapshot ─┬─ nav2 ──▶ map.yaml, map.pgm        what Nav2's map server loads
+//!           ├─ masks ─▶ keepout_mask, speed_mask  for Nav2's costmap filters; .yaml and .pgm
 //!           ├─ route ─▶ route.geojson            what Nav2's route server plans on
 //!           ├─ rooms ─▶ rooms.geojson            outlines, doorways, names; metres
 //!           ├─ mcap ──▶ map.mcap                 ROS messages, for Foxglove, rerun and `ros2 bag play`
@@ -11,6 +12,7 @@
 
 mod g2o;
 mod json;
+mod masks;
 mod mcap;
 mod nav2;
 mod rooms;
@@ -28,7 +30,8 @@ use toponym_core::Snapshot;
 #[command(
     after_help = "MAP is a file that `map --save-map` wrote, a server's checkpoint, or a map's folder in a \
     server's data folder. Without any of --nav2 … --json all are written.\n\nExamples:\n  \
-    toponym-server export tour.map out\n  toponym-server export toponym-data/main out --nav2 --route-graph"
+    toponym-server export tour.map out\n  toponym-server export toponym-data/main out --nav2 --route-graph\n  toponym-server export tour.map out \
+    --nav2 --masks --keep-out lab --slow hallway=50"
 )]
 #[allow(clippy::struct_excessive_bools, reason = "one for each form")]
 pub struct ExportArgs {
@@ -39,6 +42,15 @@ pub struct ExportArgs {
     /// map.yaml and map.pgm, for Nav2's map server and slam_toolbox's users
     #[arg(long)]
     nav2: bool,
+    /// keepout_mask.yaml and .pgm, for Nav2's costmap filters: areas drawn as forbidden, and those of --keep-out
+    #[arg(long)]
+    masks: bool,
+    /// Robots keep out of the rooms of this name, in the masks
+    #[arg(long, value_name = "NAME", requires = "masks")]
+    keep_out: Vec<String>,
+    /// Robots go at this share of their speed in the rooms of a name, percent: speed_mask.yaml and .pgm
+    #[arg(long, value_name = "NAME=PERCENT", value_parser = masks::slow, requires = "masks")]
+    slow: Vec<masks::Slow>,
     /// route.geojson, for Nav2's route server: places and doorways with names, ways that were driven
     #[arg(long)]
     route_graph: bool,
@@ -90,10 +102,14 @@ fn write(file: &Path, content: &[u8]) -> Result<()> {
 }
 
 fn files(args: &ExportArgs, snapshot: &Snapshot) -> Result<Vec<Content>> {
-    let all = !(args.nav2 || args.route_graph || args.geojson || args.g2o || args.mcap || args.json);
+    let all =
+        !(args.nav2 || args.masks || args.route_graph || args.geojson || args.g2o || args.mcap || args.json);
     let mut files = Vec::new();
     if args.nav2 || all {
         files.extend(nav2::files(&snapshot.grid(args.resolution_m)));
+    }
+    if args.masks || all && snapshot.areas().iter().any(|area| area.forbidden) {
+        files.extend(masks::files(snapshot, &snapshot.grid(args.resolution_m), &args.keep_out, &args.slow)?);
     }
     if args.route_graph || all {
         files.push(("route.geojson", serde_json::to_vec_pretty(&route::graph(snapshot))?));

@@ -5,10 +5,18 @@ use serde_json::{Value, json};
 use toponym_core::Snapshot;
 use toponym_proto::answer::MapIdentity;
 
-/// Rooms as polygons, doorways as points.
+/// Rooms and areas as polygons, doorways as points.
 pub fn collection(snapshot: &Snapshot) -> Value {
     let mut features = Vec::new();
-    for region in regions_reply(snapshot, MapIdentity::default()).regions {
+    let rooms = regions_reply(snapshot, MapIdentity::default());
+    for area in rooms.areas {
+        features.push(json!({
+            "type": "Feature",
+            "geometry": {"type": "Polygon", "coordinates": [ring(&area.polygon_m)]},
+            "properties": {"what": "area", "name": area.name, "forbidden": area.forbidden},
+        }));
+    }
+    for region in rooms.regions {
         let rings: Vec<Value> =
             std::iter::once(&region.polygon_m).chain(&region.holes_m).map(|line| ring(line)).collect();
         features.push(json!({

@@ -58,7 +58,7 @@ impl Drop for Exported {
     }
 }
 
-/// As `nav2_map_server` reads a trinary map: each pixel's occupancy, the lowest row first.
+/// As `nav2_map_server` reads a map in mode trinary or scale: each pixel's occupancy, the lowest row first.
 fn as_nav2_reads(yaml: &str, pgm: &[u8]) -> (usize, Vec<i8>) {
     let value = |key: &str| -> f64 {
         let line = yaml.lines().find_map(|l| l.strip_prefix(key)).unwrap();
@@ -79,6 +79,8 @@ fn as_nav2_reads(yaml: &str, pgm: &[u8]) -> (usize, Vec<i8>) {
             100
         } else if p <= free {
             0
+        } else if yaml.contains("mode: scale") {
+            ((p - free) / (occupied - free) * 100.0).round() as i8
         } else {
             -1
         }
@@ -95,6 +97,35 @@ fn nav2_reads_what_is_known_pixel_by_pixel() {
     let yaml = String::from_utf8(yaml).unwrap();
     assert_eq!(as_nav2_reads(&yaml, &pgm), (4, vec![-1, 0, 0, 0, -1, -1, 100, 100]));
     assert!(yaml.contains("origin: [-1.500000, 2.000000, 0.0]\n") && yaml.contains("resolution: 0.1\n"));
+}
+
+#[test]
+fn nav2_reads_masks_of_rooms_by_name_and_of_no_other() {
+    let exported = Exported::new("masks", &["--masks", "--keep-out", "gym", "--slow", "kitchen=30%"]);
+    let read = |name: &str| {
+        let pgm = std::fs::read(exported.0.join("out").join(format!("{name}.pgm"))).unwrap();
+        as_nav2_reads(&exported.text(&format!("{name}.yaml")), &pgm).1
+    };
+    let (out, slow) = (read("keepout_mask"), read("speed_mask"));
+    let of = |cells: &[i8], value: i8| cells.iter().filter(|c| **c == value).count();
+    let (forbidden, limited) = (of(&out, 100), of(&slow, 70));
+    assert!(forbidden > 1000 && limited > 1000, "{forbidden} cells, {limited}");
+    assert_eq!((forbidden + of(&out, 0), limited + of(&slow, 0)), (out.len(), slow.len()));
+    assert!(out.iter().zip(&slow).all(|(out, slow)| *out == 0 || *slow == 0), "two rooms");
+    let mut values = (0..=100_u8).collect::<Vec<_>>();
+    let grid = Grid {
+        resolution_m: 0.1,
+        width: 101,
+        height: 1,
+        map_from_grid: Pose2::default(),
+        cells: vec![0; 101],
+    };
+    let [(_, yaml), (_, pgm)] = nav2::picture(&grid, "scale", ["m.yaml", "m.pgm"], &values);
+    let back = as_nav2_reads(&String::from_utf8(yaml).unwrap(), &pgm).1;
+    assert_eq!(back, values.drain(..).map(|v| v as i8).collect::<Vec<_>>());
+    for wrong in ["kitchen", "kitchen=0", "kitchen=101", "=50x"] {
+        assert!(super::masks::slow(wrong).is_err(), "{wrong}");
+    }
 }
 
 #[test]

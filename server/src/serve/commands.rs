@@ -7,6 +7,7 @@ use toponym_proto::answer::{
     ANSWER_VERSION, Candidate, Done, ErrorCode, Goal, Mended, Problem, Reachable, Sent, WhereReply,
 };
 use toponym_proto::selector::Arguments;
+use toponym_proto::stream::{TOLD_SIGMA_M, TOLD_SIGMA_RAD};
 use toponym_proto::{Limits, Mend, Message, Pose};
 use ulid::Ulid;
 
@@ -21,22 +22,17 @@ use crate::web::Published;
 /// How long a command waits for a map that is busy.
 const COMMAND_WAIT: Duration = Duration::from_secs(60);
 
-/// Who points at where a robot is, in a picture of the map, errs by so much, …
-const TOLD_SIGMA_M: f64 = 0.5;
-/// … and by so much of its heading: as RViz has it.
-const TOLD_SIGMA_RAD: f64 = 0.26;
-
 /// Does it, and tells that it is done.
 pub fn done(board: &Board, command: &str, arguments: Arguments) -> Result<Reply, Problem> {
     match command {
         "save" => save(board, &arguments),
         "delete" => delete(board, arguments),
-        "undo" | "rename" | "forget" | "initial_pose" => mend(board, command, arguments),
+        "undo" | "rename" | "forget" | "initial_pose" | "area" => mend(board, command, arguments),
         "go" => go(board, arguments),
         _ => Err(Problem::new(ErrorCode::Unsupported, format!("there is no command {command:?}"))
             .field("key")
             .hint(
-                "this server knows do/save, do/delete, do/undo, do/rename, do/forget, do/initial_pose, do/go",
+                "this server knows do/save, do/delete, do/undo, do/rename, do/forget, do/initial_pose, do/area, do/go",
             )),
     }
 }
@@ -115,6 +111,31 @@ fn told(arguments: Arguments) -> Result<(Option<String>, Mend), Problem> {
     Ok((map, Mend::Pose { id, map_from_body, sigma_m, sigma_rad }))
 }
 
+/// `do/area?polygon_m=0,0,4,0,4,3;name=…`, with `forbidden=true` or `instead=true`.
+fn area(arguments: Arguments) -> Result<(Option<String>, Mend), Problem> {
+    let [map, id, polygon_m, name, instead, forbidden] =
+        take(arguments, ["map", "id", "polygon_m", "name", "instead", "forbidden"])?;
+    let wrong = |field: &str, must: &str| {
+        Problem::new(ErrorCode::BadArgument, format!("{field} must be {must}")).field(field)
+    };
+    let corners =
+        || wrong("polygon_m", "x and y of each corner in the map, with commas between: 0,0,4,0,4,3");
+    let numbers: Vec<f64> = polygon_m
+        .ok_or_else(corners)?
+        .split(',')
+        .map(|number| number.trim().parse().map_err(|_| corners()))
+        .collect::<Result<_, _>>()?;
+    let (polygon_m, []) = numbers.as_chunks::<2>() else { return Err(corners()) };
+    let flag = |field: &str, text: Option<String>| match text.as_deref() {
+        None | Some("false") => Ok(false),
+        Some("true") => Ok(true),
+        Some(_) => Err(wrong(field, "true or false")),
+    };
+    let (instead, forbidden) = (flag("instead", instead)?, flag("forbidden", forbidden)?);
+    let id = id.unwrap_or_else(|| Ulid::generate().to_string());
+    Ok((map, Mend::Area { id, polygon_m: polygon_m.to_vec(), name, instead, forbidden }))
+}
+
 /// `do/undo?id=…`, `do/rename?from=…;to=…`, `do/forget?name=…`, each with `map=…` where there are several.
 fn mend(board: &Board, command: &str, arguments: Arguments) -> Result<Reply, Problem> {
     let given = |field: &str, value: Option<String>| {
@@ -133,6 +154,7 @@ fn mend(board: &Board, command: &str, arguments: Arguments) -> Result<Reply, Pro
             let [map, name] = take(arguments, ["map", "name"])?;
             (map, Mend::Forget { name: given("name", name)? })
         }
+        "area" => area(arguments)?,
         _ => told(arguments)?,
     };
     Message::Mend(mend.clone()).validate(&Limits::default()).map_err(Problem::from)?;

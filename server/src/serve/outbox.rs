@@ -83,6 +83,7 @@ impl Outbox {
         let (outbox, map) = (self.clone(), map.clone());
         aside::ahead(move || {
             map.graph_waits.store(false, Ordering::Release);
+            map.snapshot.load().count_ahead();
             let key = outbox.board.keys.graph(&map.id);
             match queries::graph(&map) {
                 Ok(reply) => {

@@ -5,24 +5,23 @@ use super::api::refuse;
 use crate::serve::aside;
 use crate::serve::board::MapView;
 use axum::Json;
+use axum::body::Bytes;
 use axum::extract::rejection::PathRejection;
 use axum::extract::{Path, Query, State};
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::sync::Arc;
 use tokio::sync::Mutex;
 use tokio::task::spawn_blocking;
-use toponym_core::Snapshot;
 use toponym_core::answers::query::Grid;
 use toponym_proto::answer::{ANSWER_VERSION, ErrorCode, MapIdentity, Problem};
 use toponym_proto::grid::png_of;
 
 /// Edge of a tile, cells.
 const TILE: i64 = 128;
-/// Edge of a cell, metres.
-const RESOLUTION_M: f64 = 0.1;
 
 /// The newest tiles of each map.
 #[derive(Default)]
@@ -39,10 +38,11 @@ struct Tiled {
     tiles: BTreeMap<(i64, i64), Tile>,
 }
 
+#[derive(PartialEq)]
 struct Tile {
     /// Of its pixels: the same pixels have the same.
     hash: String,
-    png: Vec<u8>,
+    png: Bytes,
 }
 
 /// Answer of `/map/{map}/tiles`.
@@ -73,9 +73,10 @@ impl Tiles {
         if let Some(known) = all.get(&view.id).filter(|tiled| tiled.map == map) {
             return Ok(known.clone());
         }
+        let before = all.get(&view.id).cloned();
         let made = spawn_blocking(move || {
             aside::give_way();
-            Arc::new(Tiled::new(map, &snapshot))
+            Arc::new(Tiled::new(map, &snapshot.plan(), before.as_deref()))
         })
         .await;
         let tiled = made.map_err(|e| Problem::new(ErrorCode::Internal, e.to_string()))?;
@@ -84,36 +85,44 @@ impl Tiles {
     }
 
     /// A tile of the newest that were asked for.
-    async fn last(&self, id: &str, at: (i64, i64)) -> Option<(String, Vec<u8>)> {
+    async fn last(&self, id: &str, at: (i64, i64)) -> Option<(String, Bytes)> {
         let all = self.of.lock().await;
         all.get(id)?.tiles.get(&at).map(|tile| (tile.hash.clone(), tile.png.clone()))
     }
 }
 
 impl Tiled {
-    fn new(map: MapIdentity, snapshot: &Snapshot) -> Self {
-        let grid = snapshot.grid(RESOLUTION_M);
-        Self { map, resolution_m: grid.resolution_m, tiles: tiles(&grid) }
+    /// Cuts a grid along lines that stay where they are when it grows. Tiles of which nothing is known are left out; of those
+    /// that are as before, the pictures are too.
+    fn new(map: MapIdentity, grid: &Grid, before: Option<&Self>) -> Self {
+        let before = before.filter(|b| b.resolution_m.to_bits() == grid.resolution_m.to_bits());
+        let drawn = cut(grid).into_iter().filter_map(|(at, cells)| {
+            let mut hash = DefaultHasher::new();
+            cells.hash(&mut hash);
+            let hash = format!("{:016x}", hash.finish());
+            let same = before.and_then(|b| b.tiles.get(&at)).filter(|tile| tile.hash == hash);
+            let png = match same {
+                Some(tile) => tile.png.clone(),
+                None => png_of(TILE as usize, TILE as usize, &cells).ok()?.into(),
+            };
+            Some((at, Tile { hash, png }))
+        });
+        Self { map, resolution_m: grid.resolution_m, tiles: drawn.collect() }
     }
 }
 
-/// Cuts a grid along lines that stay where they are when it grows. Tiles of which nothing is known are left out.
-fn tiles(grid: &Grid) -> BTreeMap<(i64, i64), Tile> {
+/// Cells of tiles, by column and row from the map's origin on.
+fn cut(grid: &Grid) -> BTreeMap<(i64, i64), Vec<i8>> {
     let cell = |m: f64| (m / grid.resolution_m).round() as i64;
     let (left, low) = (cell(grid.map_from_grid.x_m), cell(grid.map_from_grid.y_m));
-    let mut cells: BTreeMap<(i64, i64), Vec<i8>> = BTreeMap::new();
+    let mut tiles: BTreeMap<(i64, i64), Vec<i8>> = BTreeMap::new();
     for (k, &value) in grid.cells.iter().enumerate().filter(|(_, value)| **value >= 0) {
         let (x, y) = (left + (k % grid.width) as i64, low + (k / grid.width) as i64);
-        let tile = cells.entry((x.div_euclid(TILE), y.div_euclid(TILE)));
+        let tile = tiles.entry((x.div_euclid(TILE), y.div_euclid(TILE)));
         let tile = tile.or_insert_with(|| vec![-1; (TILE * TILE) as usize]);
         tile[(y.rem_euclid(TILE) * TILE + x.rem_euclid(TILE)) as usize] = value;
     }
-    let drawn = cells.into_iter().filter_map(|(at, cells)| {
-        let bytes: Vec<u8> = cells.iter().map(|cell| cell.cast_unsigned()).collect();
-        let png = png_of(TILE as usize, TILE as usize, &cells).ok()?;
-        Some((at, Tile { hash: format!("{:08x}{:04x}", crc32fast::hash(&bytes), png.len() & 0xffff), png }))
-    });
-    drawn.collect()
+    tiles
 }
 
 /// Which tiles there are.
@@ -174,16 +183,25 @@ mod tests {
         Grid { resolution_m: 0.1, width, height, map_from_grid, cells }
     }
 
+    fn tiled(grid: &Grid, before: Option<&Tiled>) -> Tiled {
+        let map = MapIdentity { id: "m".into(), uuid: "u".into(), epoch: 0, rev: 0, level: None };
+        Tiled::new(map, grid, before)
+    }
+
     #[test]
     fn tiles_stay_where_they_are_when_the_map_grows() {
-        let small = tiles(&grid(-1, 2, vec![100, 0, 0, 100], 2));
+        let before = tiled(&grid(-1, 2, vec![100, 0, 0, 100], 2), None);
+        let small = &before.tiles;
         assert_eq!(small.keys().collect::<Vec<_>>(), [&(-1, 0), &(0, 0)]);
         // Grown by a column to the left, unknown, and one of the right beyond the second tile.
         let mut cells = vec![-1; 2 * 400];
         for (k, value) in [(1, 100), (2, 0), (401, 0), (402, 100), (399, 0)] {
             cells[k] = value;
         }
-        let grown = tiles(&grid(-2, 2, cells, 400));
+        let grid = grid(-2, 2, cells, 400);
+        let (anew, kept) = (tiled(&grid, None).tiles, tiled(&grid, Some(&before)).tiles);
+        let grown = &kept;
+        assert!(anew == kept, "as from nothing");
         assert_eq!(grown.len(), 3);
         assert!(
             [(-1, 0), (0, 0)]

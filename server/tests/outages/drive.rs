@@ -16,7 +16,7 @@ use toponym_sim::hall::{PERIOD_NS, message};
 
 /// Nothing here takes that long unless it has failed.
 pub const PATIENCE: Duration = Duration::from_secs(120);
-/// From message to message.
+/// From message to message: more than ten times as fast as robots are.
 const PERIOD: Duration = Duration::from_millis(2);
 /// A sentence after so many messages.
 const SENTENCE_EACH: u64 = 40;
@@ -122,6 +122,8 @@ pub struct Drive {
     heard: BTreeMap<String, Heard>,
     pub sent: u64,
     pub said: u64,
+    /// From message to message.
+    pub period: Duration,
     /// The highest watermark that was ever told.
     pub acked: u64,
 }
@@ -145,6 +147,7 @@ impl Drive {
             session,
             sent: 0,
             said: 0,
+            period: PERIOD,
             acked: 0,
         }
     }
@@ -200,7 +203,7 @@ impl Drive {
             assert_eq!(ack.lost, 0);
             self.acked = ack.seq;
         }
-        tokio::time::sleep(PERIOD).await;
+        tokio::time::sleep(self.period).await;
     }
 
     /// Notes what became of sentences.

@@ -204,7 +204,13 @@ mod tests {
             places: vec![id],
         };
         let regions = vec![room(0, vec![name("gym", 0.9), name("lab", 0.1)], 7), room(7, vec![], 0)];
-        let reply = RegionsReply { v: 1, query: "regions".into(), map: MapIdentity::default(), regions };
+        let reply = RegionsReply {
+            v: 1,
+            query: "regions".into(),
+            map: MapIdentity::default(),
+            regions,
+            areas: vec![],
+        };
         let text = rooms_text(&reply);
         let rows = [
             "0     room       20.0 m²  gym (0.90), leads to 7",

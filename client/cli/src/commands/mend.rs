@@ -123,13 +123,13 @@ pub async fn delete(to: &Connection, site: &str, args: &DeleteArgs) -> Result<u8
 
 /// Which map, and how patiently.
 #[derive(Debug, clap::Args)]
-struct At {
+pub struct At {
     /// Which map.
     #[arg(long, default_value = "main")]
-    map: String,
+    pub map: String,
     /// How long to wait for the answer.
     #[arg(long, value_name = "S", default_value = "10", value_parser = super::seconds)]
-    timeout: Duration,
+    pub timeout: Duration,
 }
 
 pub async fn undo(to: &Connection, site: &str, args: &UndoArgs) -> Result<u8, Failure> {
@@ -146,7 +146,11 @@ pub async fn forget(to: &Connection, site: &str, args: &ForgetArgs) -> Result<u8
 
 async fn mend(to: &Connection, site: &str, at: &At, mend: &Mend) -> Result<u8, Failure> {
     let session = to.open().await?;
-    let planner = Planner::new(&session, site, &at.map, at.timeout)?;
+    mended(&Planner::new(&session, site, &at.map, at.timeout)?, mend).await
+}
+
+/// Tells what was done, or why there is nothing to do.
+pub async fn mended(planner: &Planner, mend: &Mend) -> Result<u8, Failure> {
     match planner.mend(mend).await {
         Ok(mended) => {
             println!("{}", mended.words);

@@ -1,5 +1,6 @@
 //! The command line: arguments, exit codes, and one function per command.
 
+mod area;
 mod bag;
 mod dictate;
 mod find;
@@ -132,6 +133,10 @@ enum Command {
     Forget(mend::ForgetArgs),
     /// Tell where the robot is.
     InitialPose(mend::InitialPoseArgs),
+    /// Tell what an area is called, or that robots keep out of it.
+    Area(area::AreaArgs),
+    /// Tell all names and areas of a file.
+    Import(area::ImportArgs),
     /// End a map, and make room for another.
     Delete(mend::DeleteArgs),
     /// How does the server do?
@@ -160,6 +165,8 @@ enum Failure {
     Lost(u64),
     #[error("{0} sentences without an answer: it is not known what became of them")]
     Unheard(u64),
+    #[error("{0}")]
+    Unreadable(String),
     #[error("output: {0}")]
     Output(#[from] std::io::Error),
 }
@@ -177,6 +184,7 @@ impl Failure {
             | Self::Misread(_)
             | Self::Narration(_)
             | Self::Simulate(_)
+            | Self::Unreadable(_)
             | Self::Output(_) => exit::USAGE,
         }
     }
@@ -205,6 +213,8 @@ async fn done(args: &Args) -> Result<u8, Failure> {
         Command::Rename(rename) => mend::rename(&to, &args.site, rename).await,
         Command::Forget(forget) => mend::forget(&to, &args.site, forget).await,
         Command::InitialPose(told) => mend::initial_pose(&to, &args.site, told).await,
+        Command::Area(told) => area::area(&to, &args.site, told).await,
+        Command::Import(told) => area::import(&to, &args.site, told).await,
         Command::Delete(delete) => mend::delete(&to, &args.site, delete).await,
         Command::Status(asked) => status::status(&to, &args.site, asked).await,
         Command::Replay(replay) => play::replay(&to, &args.site, replay).await,

@@ -1,5 +1,6 @@
 //! Answers: the posterior at one moment, and what it is asked.
 
+pub mod areas;
 pub mod around;
 pub mod constraints;
 pub mod described;

@@ -3,7 +3,7 @@
 use crate::answers::differences::differences;
 use crate::answers::named::Named;
 use crate::answers::query::{
-    Answer, Difference, EdgeView, GraphAnswer, Grid, LabelCount, ParticleView, PlaceView, Query,
+    Answer, Difference, EdgeView, GraphAnswer, LabelCount, ParticleView, PlaceView, Query,
 };
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
@@ -17,7 +17,7 @@ use crate::graph::Place;
 use crate::language::act::{About, Act, Head, Question};
 use crate::language::{Content, GroundPlace, Name, Speech};
 use crate::regions::Rooms;
-use crate::regions::occupancy::{Plot, grid};
+use crate::regions::occupancy::Plot;
 use crate::scan::cloud::Point;
 use crate::smoothing::Structure;
 use crate::talk::ledger::Ledger;
@@ -143,6 +143,11 @@ impl Snapshot {
         &self.places
     }
 
+    /// Poses of all places, open ones too, in the best particle's map.
+    pub(crate) fn poses(&self) -> &[Pose2] {
+        &self.poses
+    }
+
     /// The likeliest particle.
     pub(crate) fn best(&self) -> &Particle {
         &self.particles[0]
@@ -168,32 +173,9 @@ impl Snapshot {
         }
     }
 
-    /// Occupancy grid of the best particle, as far as anything is known.
-    pub fn grid(&self, resolution_m: f64) -> Grid {
-        grid(&self.posed(), resolution_m)
-    }
-
     /// What each place of the best graph saw, in its own frame: its stamp, its pose in the map, its surfaces.
     pub fn clouds(&self) -> impl Iterator<Item = (StampNs, Pose2, &[Point])> {
         self.places.iter().zip(&self.poses).map(|(p, pose)| (p.stamp_ns, *pose, &p.content.cloud[..]))
-    }
-
-    fn posed(&self) -> Vec<(Pose2, Arc<Place>)> {
-        self.poses.iter().copied().zip(self.places.iter().cloned()).collect()
-    }
-
-    /// Regions of the best graph: made when first asked for, for all snapshots of one posterior together.
-    pub fn rooms(&self) -> &Arc<Rooms> {
-        self.shared.rooms.get_or_init(|| {
-            // One that a panic left half counted is begun anew.
-            let mut plot = self.shared.plot.lock().unwrap_or_else(|half| {
-                self.shared.plot.clear_poison();
-                let mut plot = half.into_inner();
-                *plot = None;
-                plot
-            });
-            Arc::new(Rooms::new(plot.get_or_insert_with(Rooms::plot), &self.posed()))
-        })
     }
 
     /// The same with what they are called.
@@ -382,5 +364,6 @@ pub fn open_poses(p: &Particle, places: &[Arc<Place>], open: &[OpenPlace]) -> Ve
 
 mod candidate;
 mod find;
+mod floor;
 #[cfg(test)]
 mod tests;

@@ -4,7 +4,7 @@ use crate::answers::snapshot::open_poses;
 use crate::answers::spoken;
 use crate::edge::Vertex;
 use crate::effects::{Effect, Effects};
-use crate::event::{StampNs, Told, Utterance};
+use crate::event::{Area, StampNs, Told, Utterance};
 use crate::filter::Filter;
 use crate::filter::particle::Particle;
 use crate::graph::stretches;
@@ -38,6 +38,15 @@ impl Mapper {
         let body_from_place = front.front_from_body().between(&front_from_place.unwrap_or_default());
         self.change_here(stamp_ns, effects, |filter, talk, here| {
             vec![Effect::Mended(talk.tell(filter, (told, stamp_ns), &body_from_place, here))]
+        });
+        self.stand(effects);
+    }
+
+    /// An area of the map as it is now.
+    pub(super) fn drawn(&mut self, area: &Area, effects: &mut Effects) {
+        let stamp_ns = self.track.front.newest_ns().unwrap_or_default();
+        self.change_here(stamp_ns, effects, |filter, talk, here| {
+            vec![Effect::Mended(talk.draw(filter, (area, stamp_ns), here))]
         });
         self.stand(effects);
     }

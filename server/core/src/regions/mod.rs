@@ -103,8 +103,9 @@ struct Floor {
 }
 
 impl Rooms {
-    /// Of places with their poses in the map, oldest first; `plot` is of these or of others, best of nearly the same.
-    pub fn new(plot: &mut Plot, places: &[(Pose2, Arc<Place>)]) -> Self {
+    /// Of places with their poses in the map, oldest first; `plot` is of these or of others, best of nearly the same. No way
+    /// leads through what is `forbidden`: polygons in the map, metres.
+    pub fn new(plot: &mut Plot, places: &[(Pose2, Arc<Place>)], forbidden: &[Vec<(f64, f64)>]) -> Self {
         plot.follow(places);
         let Some(raster) = Raster::new(plot) else { return Self::default() };
         let clearance = clearance::clearance(&raster);
@@ -145,7 +146,7 @@ impl Rooms {
         }
         let entered = (0..index.len()).filter(|&part| index[part].is_some());
         let cells = entered.map(|part| std::mem::take(&mut parts.cells[part])).collect();
-        let drivable = reach::drivable(&raster, &clearance, places);
+        let drivable = reach::drivable(&raster, &clearance, places, forbidden);
         let floor = Floor { raster, clearance, of: parts.of, cells, drivable };
         Self { regions, unentered, floor: Some(floor) }
     }

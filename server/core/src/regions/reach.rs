@@ -2,7 +2,7 @@
 
 use super::raster::Raster;
 use super::{Floor, Rooms};
-use crate::geometry::Pose2;
+use crate::geometry::{Pose2, is_inside};
 use crate::graph::Place;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
@@ -35,6 +35,7 @@ pub(super) fn drivable(
     raster: &Raster,
     clearance: &[f32],
     places: &[(Pose2, Arc<Place>)],
+    forbidden: &[Vec<(f64, f64)>],
 ) -> Vec<Option<u32>> {
     let mut open: Vec<bool> = clearance.iter().map(|&m| f64::from(m) >= FOOTPRINT_M).collect();
     for pair in places.windows(2).filter(|p| p[0].1.segment == p[1].1.segment) {
@@ -48,6 +49,9 @@ pub(super) fn drivable(
                 open[cell] |= raster.free[cell];
             }
         }
+    }
+    for (cell, open) in open.iter_mut().enumerate().filter(|(_, open)| **open) {
+        *open = !forbidden.iter().any(|area| is_inside(area, raster.middle(cell)));
     }
     let mut part = vec![None; open.len()];
     let mut parts = 0;

@@ -104,11 +104,16 @@ fn a_robot_drives_through_what_is_wider_than_itself() {
         90,
         &[(2, 12, 120, 20), (25, 32, 9, 3), (85, 32, 4, 3), (10, 35, 40, 30), (60, 35, 40, 30)],
     );
-    let drivable = drivable(&raster, &clearance(&raster), &[]);
-    let at = |x: usize, y: usize| drivable[y * raster.width + x];
+    let drivable = |forbidden: &[_]| drivable(&raster, &clearance(&raster), &[], forbidden);
+    let at = |x: usize, y: usize| drivable(&[])[y * raster.width + x];
     assert!(at(60, 20).is_some() && at(80, 50).is_some());
     assert_eq!((at(60, 20), at(60, 20) == at(80, 50)), (at(30, 50), false));
     assert_eq!(at(3, 20), None, "there is no room beside a wall");
+    // Where it keeps out of the wider door it comes into neither.
+    let (low, high) = (raster.middle(30 * raster.width + 20), raster.middle(36 * raster.width + 40));
+    let kept = drivable(&[vec![low, (high.0, low.1), high, (low.0, high.1)]]);
+    let of = |x: usize, y: usize| kept[y * raster.width + x];
+    assert!(of(60, 20).is_some() && of(30, 50).is_some() && of(60, 20) != of(30, 50));
 }
 
 /// Counter-clockwise.

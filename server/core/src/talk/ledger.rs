@@ -4,6 +4,7 @@
 use crate::edge::Vertex;
 use crate::event::StampNs;
 use crate::filter::labels::LabelId;
+use crate::geometry::Pose2;
 use crate::language::act::Parse;
 use crate::language::{Glossary, Name};
 use serde::{Deserialize, Serialize};
@@ -34,6 +35,27 @@ pub struct Entry {
     pub stands: bool,
 }
 
+/// An area in the ledger.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drawn {
+    /// The entry that tells of it.
+    pub utterance: u32,
+    /// Each corner in the frame of a place.
+    pub(crate) corners: Vec<(Vertex, f64, f64)>,
+    /// What it is called, as said.
+    pub name: Option<LabelId>,
+    /// Whether robots keep out.
+    pub forbidden: bool,
+}
+
+impl Drawn {
+    /// Its corners in the map, metres, by the poses of all places.
+    pub fn polygon_m(&self, poses: &[Pose2]) -> Vec<(f64, f64)> {
+        let corners = self.corners.iter();
+        corners.filter_map(|&(place, x, y)| Some(poses.get(place as usize)?.apply(x, y))).collect()
+    }
+}
+
 /// All names and utterances.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Ledger {
@@ -56,6 +78,8 @@ pub struct Ledger {
     ids: BTreeSet<String>,
     /// Utterances that describe, oldest first.
     descriptions: VecDeque<u32>,
+    /// Areas drawn at a desk, those taken back too.
+    areas: Vec<Drawn>,
 }
 
 impl Ledger {
@@ -127,6 +151,11 @@ impl Ledger {
         self.descriptions.iter().copied()
     }
 
+    /// Areas that stand, oldest first.
+    pub fn areas(&self) -> impl Iterator<Item = &Drawn> {
+        self.areas.iter().filter(|area| self.entries[area.utterance as usize].stands)
+    }
+
     /// Whether what an utterance said of a name still holds.
     pub fn speaks_of(&self, utterance: u32, label: LabelId) -> bool {
         self.forgotten.get(&label).is_none_or(|&before| utterance >= before)
@@ -144,6 +173,11 @@ impl Ledger {
             }
         }
         number
+    }
+
+    /// One more area.
+    pub(crate) fn draw(&mut self, area: Drawn) {
+        self.areas.push(area);
     }
 
     /// The id of a name as it is spelt, which may be another's alias.

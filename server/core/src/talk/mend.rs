@@ -15,8 +15,8 @@ pub(crate) fn mend(talk: &mut Talk, filter: &mut Filter, command: &Command) -> R
         Command::Undo { utterance } => undo(talk, filter, utterance.as_deref()),
         Command::Rename { from, to } => rename(talk, filter, from, to),
         Command::Forget { name } => forget_name(talk, filter, name),
-        // Comes with where the robot is: see [`Talk::tell`].
-        Command::Pose(_) => Err("a pose is told of a robot".to_owned()),
+        // These come with where the robot is: see [`Talk::tell`] and [`Talk::draw`].
+        Command::Pose(_) | Command::Area(_) => Err("that is told of a map with a robot".to_owned()),
     }
 }
 

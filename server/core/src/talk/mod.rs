@@ -6,10 +6,12 @@
 //!            └ doubts ─▶ questions ─▶ "yes": taken in
 //! "no, …", undo ─ mend ─▶ the same taken back
 //! where the robot is, pointed out ─ told ─▶ ledger, claims
+//! an area, drawn ─ areas ─▶ ledger, labels
 //! ledger, claims, one particle's map ─ fold ─▶ p(λ | G)
 //! ```
 
 mod accept;
+mod areas;
 pub mod claims;
 pub(crate) mod describe;
 mod doubts;
@@ -24,7 +26,7 @@ mod told;
 
 use crate::edge::Vertex;
 use crate::effects::Heard;
-use crate::event::{Command, StampNs, Told, Utterance};
+use crate::event::{Area, Command, StampNs, Told, Utterance};
 use crate::filter::Filter;
 use crate::filter::particle::Particle;
 use crate::filter::words::Words;
@@ -103,6 +105,16 @@ impl Talk {
         here: &Here,
     ) -> Result<String, String> {
         told::tell(self, filter, told, body_from_place, here)
+    }
+
+    /// Takes in an area, and tells what that comes to, or why it can't be taken in.
+    pub fn draw(
+        &mut self,
+        filter: &mut Filter,
+        area: (&Area, StampNs),
+        here: &Here,
+    ) -> Result<String, String> {
+        areas::draw(self, filter, area, here)
     }
 
     /// Grounds some descriptions again, one after the other in turn, in the map as it is now.

@@ -1,6 +1,7 @@
 //! The core from events to answers, on a simulated ring corridor.
 
 mod alike;
+mod areas;
 mod asked;
 mod dialogues;
 mod mounted;
@@ -325,6 +326,7 @@ fn bad_scans_are_dropped_or_harmless() {
 fn the_grid_shows_walls_and_floor() {
     let (mapper, _, poses) = mapped(1, &[]);
     let Answer::Grid(grid) = mapper.answer(&Query::Grid { resolution_m: 0.1 }) else { panic!() };
+    assert_eq!(mapper.snapshot().plan(), grid, "the same by what rooms are counted from");
     let at = |x: f64, y: f64| {
         let p = poses[0].inverse().apply(x, y);
         let (gx, gy) = ((p.0 - grid.map_from_grid.x_m) / 0.1, (p.1 - grid.map_from_grid.y_m) / 0.1);

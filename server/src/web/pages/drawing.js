@@ -49,6 +49,7 @@ export class Drawing {
     this.context = canvas.getContext("2d");
     this.tiles = new Map();
     this.regions = [];
+    this.areas = [];
     this.graph = null;
     /** Where the robot was since the graph was fetched. */
     this.trail = [];
@@ -123,7 +124,8 @@ export class Drawing {
     this.draw();
   }
 
-  setRegions(regions) {
+  setRegions(regions, areas = []) {
+    this.areas = areas;
     const known = new Map(this.regions.map((r) => [JSON.stringify(r.polygon_m), r.middle]));
     this.regions = regions.map((r) => ({ ...r, middle: known.get(JSON.stringify(r.polygon_m)) ?? middle(r.polygon_m) }));
     this.draw();
@@ -227,6 +229,20 @@ export class Drawing {
         c.strokeStyle = this.style("--strong");
         c.stroke();
       }
+    }
+    for (const area of this.areas) {
+      c.beginPath();
+      this.path(area.polygon_m, true);
+      c.lineWidth = 2 * px;
+      c.strokeStyle = c.fillStyle = this.style(area.forbidden ? "--bad" : "--soft");
+      if (area.forbidden) {
+        c.globalAlpha = 0.25;
+        c.fill();
+        c.globalAlpha = 1;
+      }
+      c.setLineDash([8 * px, 5 * px]);
+      c.stroke();
+      c.setLineDash([]);
     }
     this.drawGraph(c, px);
     this.drawLabels();

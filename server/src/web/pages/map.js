@@ -1,7 +1,7 @@
 // The map, its rooms, and questions to it.
 
 import { ask, command, element, listen } from "./api.js";
-import { Drawing } from "./drawing.js";
+import { Drawing, inside } from "./drawing.js";
 
 /** Tiles of a map that changes all the time are asked for no more often, … */
 const REFRESH_MS = 5000;
@@ -66,7 +66,7 @@ async function refresh() {
     const isFirst = !drawing.graph;
     drawing.graph = graph;
     drawing.trail = [];
-    drawing.setRegions(rooms.regions);
+    drawing.setRegions(rooms.regions, rooms.areas);
     list(rooms.regions);
     tellDoubt(graph);
     if (isFirst) drawing.fit();
@@ -170,17 +170,34 @@ async function choose(region, fly) {
       return element("li", {}, `“${text}” `, element("button", { type: "button", onclick: () => mend("undo", { id }) }, "Undo"));
     }));
   }
+  room.append(desk(region));
+}
+
+/** What only who knows the building can tell of a room: another name, and whether robots keep out. */
+function desk(region) {
+  const polygon_m = region.polygon_m.flat().join();
+  const out = drawing.areas.filter((a) => a.forbidden && inside(region.middle, a.polygon_m));
+  const button = (text, onclick) => element("button", { type: "button", onclick }, text);
+  const actions = element("p", {},
+    button("Name this room", () => form("Its name", "Name", actions, (name) => mend("area", { polygon_m, name }))),
+    out.length ? button("Robots may enter", () => mend("undo", { id: out.at(-1).id }))
+      : button("Robots keep out", () => mend("area", { polygon_m, forbidden: true })));
+  return actions;
 }
 
 function rename(from, after) {
-  const input = element("input", { type: "text", "aria-label": `Instead of ${from}`, maxlength: 100 });
-  const form = element("form", {
+  form(`Instead of ${from}`, "Rename", after, (to) => mend("rename", { from, to }));
+}
+
+/** Asks for a name where buttons were. */
+function form(label, verb, after, done) {
+  const input = element("input", { type: "text", "aria-label": label, maxlength: 100 });
+  after.replaceChildren(element("form", {
     onsubmit: (event) => {
       event.preventDefault();
-      if (input.value.trim()) mend("rename", { from, to: input.value.trim() });
+      if (input.value.trim()) done(input.value.trim());
     },
-  }, input, element("button", { type: "submit" }, "Rename"));
-  after.replaceChildren(form);
+  }, input, element("button", { type: "submit" }, verb)));
   input.focus();
 }
 

@@ -7,7 +7,7 @@ use crate::answers::whereabouts::{Bearer, SAME_PLACE_M};
 use crate::edge::{PlaceId, Vertex};
 use crate::effects::TrackState;
 use crate::filter::labels::{LabelId, Source};
-use crate::geometry::Pose2;
+use crate::geometry::{Pose2, is_inside};
 use nalgebra::Matrix3;
 use std::collections::BTreeSet;
 
@@ -19,7 +19,7 @@ impl Snapshot {
         let Bearer { spot, room, place, p_is, probability } = bearer;
         let pose = self.poses[place as usize];
         let stood = Goal { pose, is_reachable: None };
-        let (id, polygon_m, goal) = match room {
+        let (id, polygon_m, mut goal) = match room {
             None => (PlaceId::from(place), Vec::new(), stood),
             Some(r) => {
                 let (rooms, from) = (self.rooms(), self.now.robot.map(|p| (p.x_m, p.y_m)));
@@ -28,6 +28,10 @@ impl Snapshot {
                 (rooms.regions[r].id, rooms.regions[r].polygon_m.clone(), goal)
             }
         };
+        // Its edge may be near enough to stand at; who keeps out of it can't go to it.
+        if self.forbidden().iter().any(|area| is_inside(area, (pose.x_m, pose.y_m))) {
+            goal.is_reachable = Some(false);
+        }
         Candidate {
             place: id,
             label: self.ledger.name(label).to_owned(),

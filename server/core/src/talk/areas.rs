@@ -1,0 +1,113 @@
+//! Areas drawn at a desk: what they are called, and that robots keep out of them. An area lies where the places do that are
+//! nearest to its corners, however the map moves.
+
+use crate::edge::Vertex;
+use crate::event::{Area, StampNs};
+use crate::filter::Filter;
+use crate::filter::labels::{DIRECT, Evidence, Source};
+use crate::geometry::{Pose2, is_inside};
+use crate::language::Name;
+use crate::language::act::Parse;
+use crate::talk::ledger::{Drawn, Entry};
+use crate::talk::{Here, Talk};
+use std::sync::Arc;
+
+/// Areas kept.
+pub const AREAS_MAX: usize = 500;
+/// Places that an area names: of more, so many, evenly.
+const PLACES_MAX: usize = 64;
+
+/// Takes one in, and tells what that comes to, or why it can't be.
+pub(crate) fn draw(
+    talk: &mut Talk,
+    filter: &mut Filter,
+    (area, stamp_ns): (&Area, StampNs),
+    here: &Here,
+) -> Result<String, String> {
+    let poses = (here.poses)(filter.best());
+    let held = here.held.ok_or("the robot has not seen anything yet")?;
+    if talk.ledger.has(&area.id) {
+        return Err(format!("{:?} was told before", area.id));
+    }
+    if talk.ledger.is_full() || talk.ledger.areas().count() >= AREAS_MAX {
+        return Err("this map has heard all that it can keep".into());
+    }
+    let name = match &area.name {
+        Some(text) => Some(Name::new(text).ok_or_else(|| format!("{text:?} is no name"))?),
+        None => None,
+    };
+    let at = |v: &Vertex| (poses[*v as usize].x_m, poses[*v as usize].y_m);
+    let inside: Vec<Vertex> =
+        (0..poses.len() as Vertex).filter(|v| is_inside(&area.polygon_m, at(v))).collect();
+    if name.is_some() && inside.is_empty() {
+        return Err("the robot was never in that area, and only where it was has a name".into());
+    }
+    let text = words(name.as_ref(), area);
+    let entry = Entry {
+        id: area.id.clone(),
+        stamp_ns,
+        text: text.clone(),
+        parse: Parse::default(),
+        held,
+        stands: true,
+    };
+    let ledger = Arc::make_mut(&mut talk.ledger);
+    let utterance = ledger.enter(entry, false);
+    let said = name.map(|name| ledger.enter_name(&name));
+    let corners = area.polygon_m.iter().map(|&corner| anchored(&poses, corner)).collect();
+    ledger.draw(Drawn { utterance, corners, name: said, forbidden: area.forbidden });
+    if let Some(said) = said {
+        let label = ledger.meant(said);
+        let step = inside.len().div_ceil(PLACES_MAX);
+        for p in &mut filter.particles {
+            for &place in &inside {
+                let others =
+                    p.labels.names(place).into_keys().filter(|&other| area.instead && other != label);
+                for other in others {
+                    let weight = -p.labels.said(place, other);
+                    p.labels.add(Evidence::new(utterance, other, place, weight, Source::Denied));
+                }
+            }
+            for &place in inside.iter().step_by(step) {
+                p.labels.add(Evidence {
+                    utterance,
+                    said,
+                    label,
+                    place,
+                    weight: DIRECT,
+                    source: Source::Direct,
+                });
+            }
+        }
+        filter.weigh_words(talk);
+    }
+    Ok(text)
+}
+
+/// A corner in the frame of the place nearest to it.
+fn anchored(poses: &[Pose2], (x, y): (f64, f64)) -> (Vertex, f64, f64) {
+    let far_m = |pose: &Pose2| (pose.x_m - x).hypot(pose.y_m - y);
+    let nearest = poses.iter().enumerate().min_by(|a, b| far_m(a.1).total_cmp(&far_m(b.1)));
+    nearest.map_or((0, x, y), |(v, pose)| {
+        let off = pose.between(&Pose2::new(x, y, 0.0));
+        (v as Vertex, off.x_m, off.y_m)
+    })
+}
+
+fn words(name: Option<&Name>, area: &Area) -> String {
+    let (sum, n) =
+        (area.polygon_m.iter().fold((0.0, 0.0), |s, c| (s.0 + c.0, s.1 + c.1)), area.polygon_m.len());
+    let at = format!("the area about x {:.1} m, y {:.1} m", sum.0 / n as f64, sum.1 / n as f64);
+    let rest = if area.forbidden { "robots keep out of it" } else { "" };
+    match (name, area.instead) {
+        (Some(name), true) => {
+            format!("{at} is {} and nothing else{}{rest}", name.with_article(), comma(rest))
+        }
+        (Some(name), false) => format!("{at} is {}{}{rest}", name.with_article(), comma(rest)),
+        (None, _) => format!("{at}: {rest}"),
+    }
+}
+
+fn comma(rest: &str) -> &'static str {
+    if rest.is_empty() { "" } else { ", " }
+}
