@@ -129,8 +129,8 @@ pub const SAID_OUTSIDE_S: f64 = 900.0;
 pub const AGO_MAX_S: f64 = 7.0 * 86_400.0;
 /// Coordinates stay within this of the origin: an odometry frame that is further off is broken.
 pub const COORDINATE_MAX_M: f64 = 1e6;
-/// Corners of an area that is drawn at a desk.
-pub const AREA_CORNERS_MAX: usize = 1024;
+/// Corners of an area that is drawn at a desk: as many as fit into a selector.
+pub const AREA_CORNERS_MAX: usize = 400;
 /// Longest range of any laser.
 pub const RANGE_MAX_M: f64 = 1e4;
 /// Longest time between two rays.

@@ -54,6 +54,21 @@ pub struct Region {
     pub places: Vec<u64>,
 }
 
+impl Region {
+    /// Outline and holes as one line that goes to each hole and back: what it surrounds, by how often a ray crosses it, is the
+    /// region without its holes.
+    pub fn line_m(&self) -> Vec<[f64; 2]> {
+        let closed = |line: &[[f64; 2]]| line.iter().chain(line.first()).copied().collect::<Vec<_>>();
+        let mut whole = self.polygon_m.clone();
+        for hole in &self.holes_m {
+            whole.extend(self.polygon_m.first().filter(|first| whole.last() != Some(first)));
+            whole.extend(closed(hole));
+            whole.extend(self.polygon_m.first());
+        }
+        whole
+    }
+}
+
 /// A name of a region.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RegionName {
@@ -138,4 +153,43 @@ pub struct LabelEntry {
     pub utterances: u64,
     /// Region that most likely bears it.
     pub region: u64,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_corridor_goes_round_is_not_in_it() {
+        let square = |low: f64, high: f64| vec![[low, low], [high, low], [high, high], [low, high]];
+        let region = Region {
+            id: 0,
+            kind: "corridor".into(),
+            names: vec![],
+            area_m2: 64.0,
+            polygon_m: square(0.0, 10.0),
+            holes_m: vec![square(2.0, 4.0), square(6.0, 8.0)],
+            doorways: vec![],
+            places: vec![],
+        };
+        let line = region.line_m();
+        // As `toponym_core::geometry::is_inside`.
+        let is_inside = |x: f64, y: f64| {
+            let next = line.iter().skip(1).chain(line.first());
+            let crosses = |(a, b): &(&[f64; 2], &[f64; 2])| {
+                (a[1] > y) != (b[1] > y) && x < a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
+            };
+            line.iter().zip(next).filter(crosses).count() % 2 == 1
+        };
+        for (x, y, inside) in [
+            (1.0, 5.0, true),
+            (5.0, 5.3, true),
+            (3.0, 3.1, false),
+            (7.0, 7.1, false),
+            (9.0, 3.0, true),
+            (11.0, 1.0, false),
+        ] {
+            assert_eq!(is_inside(x, y), inside, "{x} {y}");
+        }
+    }
 }

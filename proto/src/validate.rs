@@ -189,13 +189,13 @@ fn check_mend(mend: &Mend, limits: &Limits) -> Result<(), Invalid> {
             check_number("sigma_m", *sigma_m, SIGMA_MIN, SIGMA_MAX_M)?;
             check_number("sigma_rad", *sigma_rad, SIGMA_MIN, PI)
         }
-        Mend::Area { id, polygon_m, name, forbidden, .. } => {
+        Mend::Area { id, polygon_m, name, instead, forbidden } => {
             check_token("id", id)?;
             check_polygon("polygon_m", polygon_m)?;
             match name {
                 Some(name) => check_text("name", name, limits),
-                None if *forbidden => Ok(()),
-                None => Err(Invalid::new("name", "is missing: an area has one, or is forbidden")),
+                None if *forbidden && !instead => Ok(()),
+                None => Err(Invalid::new("name", "is missing: an area has one, or is forbidden alone")),
             }
         }
     }

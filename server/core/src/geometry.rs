@@ -15,6 +15,14 @@ pub fn wrap(angle_rad: f64) -> f64 {
     if a > PI { a - TAU } else { a }
 }
 
+/// Opposite corners of what a polygon spans; of none, nothing.
+pub fn spanned(polygon: &[(f64, f64)]) -> [(f64, f64); 2] {
+    let none = [(f64::INFINITY, f64::INFINITY), (f64::NEG_INFINITY, f64::NEG_INFINITY)];
+    polygon
+        .iter()
+        .fold(none, |[low, high], p| [(low.0.min(p.0), low.1.min(p.1)), (high.0.max(p.0), high.1.max(p.1))])
+}
+
 /// Whether a point lies in a polygon, by how often a ray from it crosses the outline.
 pub fn is_inside(polygon: &[(f64, f64)], (x, y): (f64, f64)) -> bool {
     let next = polygon.iter().skip(1).chain(polygon.first());

@@ -8,6 +8,7 @@ use toponym_core::Snapshot;
 use toponym_core::answers::query::Grid;
 use toponym_core::geometry::is_inside;
 use toponym_proto::answer::MapIdentity;
+use toponym_proto::regions::{Region, RegionName};
 
 /// A room bears a name that is rather its own than not.
 const CALLED_MIN: f64 = 0.5;
@@ -54,20 +55,20 @@ type Polygon = Vec<(f64, f64)>;
 
 /// Areas and rooms of a name.
 fn called(snapshot: &Snapshot, name: &str) -> Result<Vec<Polygon>> {
-    let known = snapshot.where_is(name, None).label.unwrap_or_else(|| name.to_owned());
     let rooms = regions_reply(snapshot, MapIdentity::default());
-    let areas = rooms.areas.iter().filter(|a| a.name.as_ref() == Some(&known)).map(|a| &a.polygon_m);
-    let areas: Vec<&Vec<[f64; 2]>> = areas.collect();
-    let is_called = |names: &[toponym_proto::regions::RegionName]| {
-        names.iter().any(|n| n.label == known && n.p >= CALLED_MIN)
-    };
-    let regions = rooms.regions.iter().filter(|r| is_called(&r.names)).map(|r| &r.polygon_m);
+    // Just that: of what is only like it nobody said that robots keep out.
+    let is_it = |label: &String| label.eq_ignore_ascii_case(name);
+    let areas =
+        rooms.areas.iter().filter(|a| a.name.as_ref().is_some_and(is_it)).map(|a| a.polygon_m.clone());
+    let areas: Vec<Vec<[f64; 2]>> = areas.collect();
+    let is_called = |names: &[RegionName]| names.iter().any(|n| is_it(&n.label) && n.p >= CALLED_MIN);
+    let regions = rooms.regions.iter().filter(|r| is_called(&r.names)).map(Region::line_m);
     // What somebody drew is what they mean.
-    let all: Vec<&Vec<[f64; 2]>> = if areas.is_empty() { regions.collect() } else { areas };
+    let all: Vec<Vec<[f64; 2]>> = if areas.is_empty() { regions.collect() } else { areas };
     if all.is_empty() {
         bail!("no room of this map is {name:?}: `toponym rooms` lists their names");
     }
-    Ok(all.into_iter().map(|line| line.iter().map(|&[x, y]| (x, y)).collect()).collect())
+    Ok(all.into_iter().map(|line| line.into_iter().map(|[x, y]| (x, y)).collect()).collect())
 }
 
 /// Values of cells, row-major as in the grid: the highest of those that hold there, else 0.

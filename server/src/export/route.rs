@@ -4,6 +4,7 @@ use crate::convert::regions_reply;
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use toponym_core::answers::query::PlaceView;
+use toponym_core::geometry::is_inside;
 use toponym_core::regions::{FOOTPRINT_M, Rooms};
 use toponym_core::{Pose2, Snapshot};
 use toponym_proto::answer::MapIdentity;
@@ -60,6 +61,17 @@ pub fn graph(snapshot: &Snapshot) -> Value {
             }
         }
     }
+    let areas = snapshot.areas();
+    ways.retain(|way| {
+        let [a, b] = way.of.map(|k| (nodes[k].x_m, nodes[k].y_m));
+        let steps = (way.length_m / STEP_M).ceil().max(1.0);
+        let at = |k: usize| {
+            let share = k as f64 / steps;
+            (a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1))
+        };
+        let keeps_out = |p| areas.iter().any(|area| area.forbidden && is_inside(&area.polygon_m, p));
+        !(0..=steps as usize).any(|k| keeps_out(at(k)))
+    });
     collection(&nodes, &ways)
 }
 

@@ -90,9 +90,13 @@ impl Answered {
             && (from.says_the_same(snapshot) || !lock(&self.waits).more())
         {
             if !slot.begun.swap(true, Ordering::Relaxed) {
-                let (snapshot, text, lang) = (snapshot.clone(), text.to_owned(), lang.map(str::to_owned));
+                let (text, lang) = (text.to_owned(), lang.map(str::to_owned));
+                let (snapshot, slot) = (Arc::downgrade(snapshot), Arc::downgrade(&slot));
+                // By the time that its turn comes there may be another snapshot, and nobody wants it.
                 aside::ahead(move || {
-                    slot.answer.get_or_init(|| snapshot.where_is(&text, lang.as_deref()));
+                    if let (Some(snapshot), Some(slot)) = (snapshot.upgrade(), slot.upgrade()) {
+                        slot.answer.get_or_init(|| snapshot.where_is(&text, lang.as_deref()));
+                    }
                 });
             }
             return (from, answer);

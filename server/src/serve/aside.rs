@@ -11,7 +11,8 @@ const NICENESS: i32 = 10;
 /// What nobody waits for, one after the other.
 static AHEAD: LazyLock<Option<ThreadPool>> = LazyLock::new(|| {
     let named = ThreadPoolBuilder::new().num_threads(1).thread_name(|_| "answer".into());
-    named.start_handler(|_| give_way()).build().ok()
+    let told = |_| tracing::error!("an answer made a panic: please report it");
+    named.start_handler(|_| give_way()).panic_handler(told).build().ok()
 });
 
 /// From now on this thread gives way to those of filters and of the network.

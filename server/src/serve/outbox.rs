@@ -1,5 +1,5 @@
-//! Everything published goes through one bounded queue and one thread, so that a client that does
-//! not read can't hold up a map.
+//! What is published goes through one bounded queue and one thread, so that a client that does not read can't hold up a map;
+//! graphs, which are long, go by a thread that gives way.
 
 use axum::body::Bytes;
 use serde::Serialize;
@@ -83,6 +83,9 @@ impl Outbox {
         let (outbox, map) = (self.clone(), map.clone());
         aside::ahead(move || {
             map.graph_waits.store(false, Ordering::Release);
+            if outbox.board.stopped.load(Ordering::Acquire) {
+                return;
+            }
             map.snapshot.load().count_ahead();
             let key = outbox.board.keys.graph(&map.id);
             match queries::graph(&map) {

@@ -184,8 +184,13 @@ fn answer_about(map: &MapView, ask: Ask, arguments: Arguments) -> Result<Reply, 
         Ask::Grid => {
             let [resolution, format] = take(arguments, ["resolution_m", "format"])?;
             let resolution_m = resolution.map_or(Ok(RESOLUTION_DEFAULT_M), |r| resolution_m(&r))?;
-            let what = format!("grid {resolution_m} {format:?}");
-            map.written.of(&snapshot, &what, || grid(&snapshot, resolution_m, format.as_deref(), identity))
+            let format = format.as_deref().unwrap_or("json");
+            if !["json", "png"].contains(&format) {
+                let problem = Problem::new(ErrorCode::BadArgument, format!("there is no format {format:?}"));
+                return Err(problem.field("format").hint("json or png"));
+            }
+            let what = format!("grid {resolution_m} {format}");
+            map.written.of(&snapshot, &what, || grid(&snapshot, resolution_m, format, identity))
         }
     }
 }
@@ -195,27 +200,17 @@ fn other_answer() -> Problem {
 }
 
 /// The grid of a map: as JSON, or as a picture alone.
-fn grid(
-    snapshot: &Snapshot,
-    resolution_m: f64,
-    format: Option<&str>,
-    map: MapIdentity,
-) -> Result<Reply, Problem> {
+fn grid(snapshot: &Snapshot, resolution_m: f64, format: &str, map: MapIdentity) -> Result<Reply, Problem> {
     let internal = |e: Invalid| Problem::new(ErrorCode::Internal, e.to_string());
     let reply = convert::grid_reply(&snapshot.grid(resolution_m), map).map_err(internal)?;
-    match format {
-        None | Some("json") => json(&reply),
-        Some("png") if reply.png.is_empty() => {
-            Err(Problem::new(ErrorCode::BadArgument, "the map has seen nothing to draw yet").field("format"))
-        }
-        Some("png") => {
-            let payload = reply.picture().map_err(internal)?.into();
-            Ok(Reply { payload, encoding: ENCODING_PNG })
-        }
-        Some(other) => Err(Problem::new(ErrorCode::BadArgument, format!("there is no format {other:?}"))
-            .field("format")
-            .hint("json or png")),
+    if format == "json" {
+        return json(&reply);
     }
+    if reply.png.is_empty() {
+        let problem = Problem::new(ErrorCode::BadArgument, "the map has seen nothing to draw yet");
+        return Err(problem.field("format"));
+    }
+    Ok(Reply { payload: reply.picture().map_err(internal)?.into(), encoding: ENCODING_PNG })
 }
 
 /// The graph of a map, as asked and as published.

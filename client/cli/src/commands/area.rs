@@ -6,10 +6,12 @@ use serde::Deserialize;
 use std::path::PathBuf;
 use toponym::{Connection, Planner};
 use toponym_proto::Mend;
-use toponym_proto::regions::{Region, RegionsReply};
+use toponym_proto::regions::{Area, Region, RegionsReply};
 
 /// A room bears a name that is rather its own than not.
 const CALLED_MIN: f64 = 0.5;
+/// Corners that are nearer to each other are the same.
+const SAME_M: f64 = 0.05;
 
 /// Arguments of `area`.
 #[derive(Debug, clap::Args)]
@@ -66,7 +68,7 @@ pub async fn area(to: &Connection, site: &str, args: &AreaArgs) -> Result<u8, Fa
             println!("no room is rather {name:?} than something else: `toponym rooms` lists their names");
             return Ok(exit::NOT_KNOWN);
         };
-        polygons.push(region.polygon_m.clone());
+        polygons.push(region.line_m());
     }
     let mut code = exit::FOUND;
     for polygon_m in polygons {
@@ -147,17 +149,24 @@ type Told = (Vec<[f64; 2]>, Option<String>, bool);
 fn read(text: &str) -> Result<Vec<Told>, serde_json::Error> {
     let Names { areas, regions } = serde_json::from_str(text)?;
     let rooms = regions.into_iter().filter_map(|room| {
-        let name = room.names.into_iter().next().filter(|name| name.p >= CALLED_MIN)?;
-        Some((room.polygon_m, Some(name.label), false))
+        let name = room.names.first().filter(|name| name.p >= CALLED_MIN)?.label.clone();
+        Some((room.line_m(), Some(name), false))
     });
     Ok(rooms.chain(areas.into_iter().map(|a| (a.polygon_m, a.name, a.forbidden))).collect())
 }
 
+/// Whether the map has it already: lines that are drawn again differ by how places have moved meanwhile.
 fn is_known(known: &RegionsReply, polygon_m: &[[f64; 2]], name: Option<&String>, forbidden: bool) -> bool {
-    let bears = |r: &Region| r.names.first().is_some_and(|n| Some(&n.label) == name && n.p >= CALLED_MIN);
-    let is_room = !forbidden && known.regions.iter().any(|r| r.polygon_m == polygon_m && bears(r));
-    let is_area = |a: &toponym_proto::regions::Area| {
-        a.name.as_ref() == name && a.forbidden == forbidden && a.polygon_m == polygon_m
+    let is_line = |line: &[[f64; 2]]| {
+        let near = |(a, b): (&[f64; 2], &[f64; 2])| (a[0] - b[0]).hypot(a[1] - b[1]) < SAME_M;
+        line.len() == polygon_m.len() && line.iter().zip(polygon_m).all(near)
+    };
+    let is_name = |label: &str| name.is_some_and(|name| name.eq_ignore_ascii_case(label));
+    let bears = |r: &Region| r.names.first().is_some_and(|n| is_name(&n.label) && n.p >= CALLED_MIN);
+    let is_room = !forbidden && known.regions.iter().any(|r| bears(r) && is_line(&r.line_m()));
+    let is_area = |a: &Area| {
+        let same = a.name.as_deref().map_or(name.is_none(), is_name);
+        same && a.forbidden == forbidden && is_line(&a.polygon_m)
     };
     is_room || known.areas.iter().any(is_area)
 }

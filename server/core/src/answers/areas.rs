@@ -21,16 +21,20 @@ impl Snapshot {
         let ledger = self.ledger();
         let view = |area: &crate::talk::ledger::Drawn| AreaView {
             id: ledger.entries()[area.utterance as usize].id.clone(),
-            name: area.name.map(|said| ledger.name(ledger.meant(said)).to_owned()),
+            name: area
+                .name
+                .map(|said| ledger.meant(said))
+                .filter(|&label| ledger.speaks_of(area.utterance, label))
+                .map(|label| ledger.name(label).to_owned()),
             forbidden: area.forbidden,
             polygon_m: area.polygon_m(self.poses()),
         };
-        ledger.areas().map(view).collect()
+        ledger.areas().iter().map(view).collect()
     }
 
     /// Where robots keep out: polygons in the map, metres.
     pub(crate) fn forbidden(&self) -> Vec<Vec<(f64, f64)>> {
-        let areas = self.ledger().areas().filter(|area| area.forbidden);
+        let areas = self.ledger().areas().iter().filter(|area| area.forbidden);
         areas.map(|area| area.polygon_m(self.poses())).collect()
     }
 }

@@ -151,12 +151,6 @@ impl Labels {
         sums.into_iter().map(|(label, spoken)| (label, spoken.applies())).collect()
     }
 
-    /// What was said of a name at a place: Σ Δα, without what denies it.
-    pub fn said(&self, place: Vertex, label: LabelId) -> f64 {
-        let of_it = |e: &&Evidence| e.place == place && e.label == label && e.source != Source::Denied;
-        self.evidence.iter().filter(of_it).map(|e| e.weight).sum()
-    }
-
     /// Probability that a name applies to each place that has evidence for it.
     pub fn applies(&self, label: LabelId) -> BTreeMap<Vertex, f64> {
         self.applies_if(|e| e.label == label)

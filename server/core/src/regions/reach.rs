@@ -2,7 +2,7 @@
 
 use super::raster::Raster;
 use super::{Floor, Rooms};
-use crate::geometry::{Pose2, is_inside};
+use crate::geometry::{Pose2, is_inside, spanned};
 use crate::graph::Place;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
@@ -50,8 +50,13 @@ pub(super) fn drivable(
             }
         }
     }
-    for (cell, open) in open.iter_mut().enumerate().filter(|(_, open)| **open) {
-        *open = !forbidden.iter().any(|area| is_inside(area, raster.middle(cell)));
+    for area in forbidden {
+        let [low, high] = spanned(area);
+        for (cell, open) in open.iter_mut().enumerate().filter(|(_, open)| **open) {
+            let (x, y) = raster.middle(cell);
+            let is_near = x >= low.0 && x <= high.0 && y >= low.1 && y <= high.1;
+            *open = !(is_near && is_inside(area, (x, y)));
+        }
     }
     let mut part = vec![None; open.len()];
     let mut parts = 0;

@@ -4,12 +4,13 @@
 use crate::edge::Vertex;
 use crate::event::{Area, StampNs};
 use crate::filter::Filter;
-use crate::filter::labels::{DIRECT, Evidence, Source};
+use crate::filter::labels::{DIRECT, Evidence, LabelId, Labels, Source};
 use crate::geometry::{Pose2, is_inside};
 use crate::language::Name;
 use crate::language::act::Parse;
 use crate::talk::ledger::{Drawn, Entry};
 use crate::talk::{Here, Talk};
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Areas kept.
@@ -25,11 +26,11 @@ pub(crate) fn draw(
     here: &Here,
 ) -> Result<String, String> {
     let poses = (here.poses)(filter.best());
-    let held = here.held.ok_or("the robot has not seen anything yet")?;
+    let newest = here.held.ok_or("the robot has not seen anything yet")?;
     if talk.ledger.has(&area.id) {
         return Err(format!("{:?} was told before", area.id));
     }
-    if talk.ledger.is_full() || talk.ledger.areas().count() >= AREAS_MAX {
+    if talk.ledger.is_full() || talk.ledger.areas().len() >= AREAS_MAX {
         return Err("this map has heard all that it can keep".into());
     }
     let name = match &area.name {
@@ -42,6 +43,8 @@ pub(crate) fn draw(
     if name.is_some() && inside.is_empty() {
         return Err("the robot was never in that area, and only where it was has a name".into());
     }
+    // Not where the robot is by chance: what is said of the place held is said of its whole room.
+    let held = inside.first().copied().unwrap_or(newest);
     let text = words(name.as_ref(), area);
     let entry = Entry {
         id: area.id.clone(),
@@ -60,13 +63,10 @@ pub(crate) fn draw(
         let label = ledger.meant(said);
         let step = inside.len().div_ceil(PLACES_MAX);
         for p in &mut filter.particles {
-            for &place in &inside {
-                let others =
-                    p.labels.names(place).into_keys().filter(|&other| area.instead && other != label);
-                for other in others {
-                    let weight = -p.labels.said(place, other);
-                    p.labels.add(Evidence::new(utterance, other, place, weight, Source::Denied));
-                }
+            if area.instead {
+                deny_others(&mut p.labels, &inside, utterance, |said| {
+                    said != label && !talk.ledger.name(said).is_empty()
+                });
             }
             for &place in inside.iter().step_by(step) {
                 p.labels.add(Evidence {
@@ -82,6 +82,30 @@ pub(crate) fn draw(
         filter.weigh_words(talk);
     }
     Ok(text)
+}
+
+/// Denies what was said of places: of each name as much as all sentences say together, each of them once however many places
+/// it was carried to, less what was denied before.
+fn deny_others(labels: &mut Labels, inside: &[Vertex], utterance: u32, is_other: impl Fn(LabelId) -> bool) {
+    let (mut said, mut denied) = (BTreeMap::<_, f64>::new(), BTreeMap::<_, f64>::new());
+    let mut at = BTreeSet::new();
+    let here = |e: &&Evidence| is_other(e.label) && inside.binary_search(&e.place).is_ok();
+    for e in labels.evidence().iter().filter(here) {
+        at.insert((e.said, e.label, e.place));
+        let of = if e.source == Source::Denied { &mut denied } else { &mut said };
+        let most = of.entry((e.label, e.utterance)).or_insert(0.0);
+        *most = most.max(e.weight.abs());
+    }
+    for (said_as, label, place) in at {
+        let sum = |of: &BTreeMap<(LabelId, u32), f64>| {
+            of.range((label, 0)..=(label, u32::MAX)).map(|(_, w)| w).sum::<f64>()
+        };
+        let weight = sum(&said) - sum(&denied);
+        if weight > 0.0 {
+            let source = Source::Denied;
+            labels.add(Evidence { utterance, said: said_as, label, place, weight: -weight, source });
+        }
+    }
 }
 
 /// A corner in the frame of the place nearest to it.

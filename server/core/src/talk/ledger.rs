@@ -78,7 +78,7 @@ pub struct Ledger {
     ids: BTreeSet<String>,
     /// Utterances that describe, oldest first.
     descriptions: VecDeque<u32>,
-    /// Areas drawn at a desk, those taken back too.
+    /// Areas drawn at a desk.
     areas: Vec<Drawn>,
 }
 
@@ -140,10 +140,14 @@ impl Ledger {
         self.entries.len() >= UTTERANCES_MAX || self.names.len() >= NAMES_MAX
     }
 
-    /// The number of an utterance that stands; of the newest one without an id.
+    /// The number of an utterance that stands; without an id of the newest one, but areas, which nobody said.
     pub fn standing(&self, id: Option<&str>) -> Option<u32> {
-        let wanted = |e: &Entry| e.stands && id.is_none_or(|id| e.id == id);
-        self.entries.iter().rposition(wanted).map(|k| k as u32)
+        let is_drawn = |k: u32| self.areas.iter().any(|area| area.utterance == k);
+        let wanted = |k: &u32| {
+            let entry = &self.entries[*k as usize];
+            entry.stands && id.map_or_else(|| !is_drawn(*k), |id| entry.id == id)
+        };
+        (0..self.entries.len() as u32).rev().find(wanted)
     }
 
     /// Descriptions that are still grounded again, oldest first.
@@ -152,8 +156,8 @@ impl Ledger {
     }
 
     /// Areas that stand, oldest first.
-    pub fn areas(&self) -> impl Iterator<Item = &Drawn> {
-        self.areas.iter().filter(|area| self.entries[area.utterance as usize].stands)
+    pub fn areas(&self) -> &[Drawn] {
+        &self.areas
     }
 
     /// Whether what an utterance said of a name still holds.
@@ -206,6 +210,7 @@ impl Ledger {
     pub(crate) fn strike(&mut self, utterance: u32) {
         self.entries[utterance as usize].stands = false;
         self.descriptions.retain(|&u| u != utterance);
+        self.areas.retain(|area| area.utterance != utterance);
         self.aliases.retain(|_, (_, by)| *by != Some(utterance));
     }
 

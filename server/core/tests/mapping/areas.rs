@@ -54,6 +54,14 @@ fn an_area_is_called_as_drawn_until_that_is_taken_back() {
     draw(&mut mapper, &lab).unwrap();
     assert!(p_is(&mapper, "lab") > 0.9 && p_is(&mapper, "den") < 0.5, "{}", p_is(&mapper, "den"));
     undo(&mut mapper, "b");
+    // However many said so.
+    let again = about(&mapper, "a2", Some("den"), 3.0);
+    draw(&mut mapper, &again).unwrap();
+    draw(&mut mapper, &Area { id: "b2".into(), ..lab.clone() }).unwrap();
+    assert!(p_is(&mapper, "lab") > 0.9 && p_is(&mapper, "den") < 0.5, "{}", p_is(&mapper, "den"));
+    for id in ["b2", "a2"] {
+        undo(&mut mapper, id);
+    }
     assert!(p_is(&mapper, "den") > 0.9, "as it was");
     undo(&mut mapper, "a");
     let after = (mapper.snapshot().labels(), mapper.snapshot().graph().places);
@@ -83,7 +91,14 @@ fn no_way_leads_into_what_is_forbidden() {
     assert!(draw(&mut mapper, &out).unwrap().ends_with("robots keep out of it"));
     let after = goal(&mapper);
     let at = (after.pose.x_m, after.pose.y_m);
-    assert!(!is_inside(&den.polygon_m, at) && after.is_reachable == Some(false), "{after:?}");
+    assert!(!is_inside(&den.polygon_m, at), "{after:?}");
+    // … nor anywhere, where all of it is.
+    let all = Area { id: "c".into(), forbidden: true, ..about(&mapper, "c", None, 100.0) };
+    draw(&mut mapper, &all).unwrap();
+    assert_eq!(goal(&mapper).is_reachable, Some(false));
+    mapper.step(Event::Command(Command::Undo { utterance: None }));
+    assert_eq!(mapper.snapshot().areas().len(), 3, "what was drawn is taken back by its id alone");
+    undo(&mut mapper, "c");
     undo(&mut mapper, "b");
     assert_eq!(goal(&mapper), before);
 }

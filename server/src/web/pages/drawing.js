@@ -237,7 +237,7 @@ export class Drawing {
       c.strokeStyle = c.fillStyle = this.style(area.forbidden ? "--bad" : "--soft");
       if (area.forbidden) {
         c.globalAlpha = 0.25;
-        c.fill();
+        c.fill("evenodd");
         c.globalAlpha = 1;
       }
       c.setLineDash([8 * px, 5 * px]);

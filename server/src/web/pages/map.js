@@ -175,7 +175,10 @@ async function choose(region, fly) {
 
 /** What only who knows the building can tell of a room: another name, and whether robots keep out. */
 function desk(region) {
-  const polygon_m = region.polygon_m.flat().join();
+  // One line that goes to each hole and back: what a corridor goes round is not in it.
+  const ring = (line) => [...line, line[0]];
+  const holes = region.holes_m.flatMap((hole) => [...ring(hole), region.polygon_m[0]]);
+  const polygon_m = (holes.length ? [...ring(region.polygon_m), ...holes] : region.polygon_m).flat().join();
   const out = drawing.areas.filter((a) => a.forbidden && inside(region.middle, a.polygon_m));
   const button = (text, onclick) => element("button", { type: "button", onclick }, text);
   const actions = element("p", {},

@@ -28,8 +28,7 @@ impl Snapshot {
                 (rooms.regions[r].id, rooms.regions[r].polygon_m.clone(), goal)
             }
         };
-        // Its edge may be near enough to stand at; who keeps out of it can't go to it.
-        if self.forbidden().iter().any(|area| is_inside(area, (pose.x_m, pose.y_m))) {
+        if self.forbidden().iter().any(|area| is_inside(area, (goal.pose.x_m, goal.pose.y_m))) {
             goal.is_reachable = Some(false);
         }
         Candidate {
