@@ -15,14 +15,6 @@ pub fn wrap(angle_rad: f64) -> f64 {
     if a > PI { a - TAU } else { a }
 }
 
-/// Opposite corners of what a polygon spans; of none, nothing.
-pub fn spanned(polygon: &[(f64, f64)]) -> [(f64, f64); 2] {
-    let none = [(f64::INFINITY, f64::INFINITY), (f64::NEG_INFINITY, f64::NEG_INFINITY)];
-    polygon
-        .iter()
-        .fold(none, |[low, high], p| [(low.0.min(p.0), low.1.min(p.1)), (high.0.max(p.0), high.1.max(p.1))])
-}
-
 /// Whether a point lies in a polygon, by how often a ray from it crosses the outline.
 pub fn is_inside(polygon: &[(f64, f64)], (x, y): (f64, f64)) -> bool {
     let next = polygon.iter().skip(1).chain(polygon.first());
@@ -30,6 +22,18 @@ pub fn is_inside(polygon: &[(f64, f64)], (x, y): (f64, f64)) -> bool {
         (a.1 > y) != (b.1 > y) && x < a.0 + (y - a.1) / (b.1 - a.1) * (b.0 - a.0)
     };
     polygon.iter().zip(next).filter(crosses).count() % 2 == 1
+}
+
+/// Whether a point lies in a polygon, or nearer to its outline than that.
+pub fn is_near(polygon: &[(f64, f64)], (x, y): (f64, f64), reach_m: f64) -> bool {
+    let next = polygon.iter().skip(1).chain(polygon.first());
+    let off_m = |(a, b): (&(f64, f64), &(f64, f64))| {
+        let (dx, dy) = (b.0 - a.0, b.1 - a.1);
+        let along = ((x - a.0) * dx + (y - a.1) * dy) / (dx * dx + dy * dy);
+        let share = if along.is_finite() { along.clamp(0.0, 1.0) } else { 0.0 };
+        (x - a.0 - share * dx).hypot(y - a.1 - share * dy)
+    };
+    is_inside(polygon, (x, y)) || polygon.iter().zip(next).any(|side| off_m(side) < reach_m)
 }
 
 /// A rigid transform of the plane, or the pose of a body.
@@ -177,6 +181,12 @@ mod tests {
             angle.reverse();
         }
         assert!(!is_inside(&[], (0.0, 0.0)));
+        let twice = [(0.0, 0.0), (0.0, 0.0), (4.0, 0.0), (4.0, 4.0)];
+        for (point, near) in
+            [((4.2, 2.0), true), ((4.4, 2.0), false), ((-0.2, -0.2), true), ((3.0, 1.0), true)]
+        {
+            assert_eq!(is_near(&twice, point, 0.3), near, "{point:?}");
+        }
     }
 
     proptest! {

@@ -188,7 +188,7 @@ mod tests {
         assert_eq!(read(exported).unwrap(), [lab, out]);
         let by_hand = r#"{"areas": [{"name": "lab", "polygon_m": [[0, 0], [4, 0], [4, 3]]}]}"#;
         assert_eq!(read(by_hand).unwrap().len(), 1);
-        assert!(read("[]").is_err() && read(r#"{"areas": [{"name": "lab"}]}"#).is_err());
+        assert!(read("7").is_err() && read(r#"{"areas": [{"name": "lab"}]}"#).is_err());
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use super::raster::Raster;
 use super::{Floor, Rooms};
-use crate::geometry::{Pose2, is_inside, spanned};
+use crate::geometry::{Pose2, is_near};
 use crate::graph::Place;
 use serde::{Deserialize, Serialize};
 use std::cmp::Reverse;
@@ -50,12 +50,18 @@ pub(super) fn drivable(
             }
         }
     }
+    // No part of a robot is to be in them.
     for area in forbidden {
-        let [low, high] = spanned(area);
+        let reach = |coordinate: fn(&(f64, f64)) -> f64| {
+            let all = || area.iter().map(coordinate);
+            all().fold(f64::INFINITY, f64::min) - FOOTPRINT_M
+                ..=all().fold(f64::NEG_INFINITY, f64::max) + FOOTPRINT_M
+        };
+        let (columns, rows) = (reach(|p| p.0), reach(|p| p.1));
         for (cell, open) in open.iter_mut().enumerate().filter(|(_, open)| **open) {
             let (x, y) = raster.middle(cell);
-            let is_near = x >= low.0 && x <= high.0 && y >= low.1 && y <= high.1;
-            *open = !(is_near && is_inside(area, (x, y)));
+            let may_be = columns.contains(&x) && rows.contains(&y);
+            *open = !(may_be && is_near(area, (x, y), FOOTPRINT_M));
         }
     }
     let mut part = vec![None; open.len()];

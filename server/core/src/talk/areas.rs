@@ -15,8 +15,9 @@ use std::sync::Arc;
 
 /// Areas kept.
 pub const AREAS_MAX: usize = 500;
-/// Places that an area names: of more, so many, evenly.
-const PLACES_MAX: usize = 64;
+/// Of the places in an area some get its name, so far apart at least: in a room one or two. A sentence is one unit of evidence,
+/// and one from a desk is no more.
+const APART_M: f64 = 4.0;
 
 /// Takes one in, and tells what that comes to, or why it can't be.
 pub(crate) fn draw(
@@ -61,14 +62,14 @@ pub(crate) fn draw(
     ledger.draw(Drawn { utterance, corners, name: said, forbidden: area.forbidden });
     if let Some(said) = said {
         let label = ledger.meant(said);
-        let step = inside.len().div_ceil(PLACES_MAX);
+        let named = spread(&poses, &inside, &area.polygon_m);
         for p in &mut filter.particles {
             if area.instead {
                 deny_others(&mut p.labels, &inside, utterance, |said| {
                     said != label && !talk.ledger.name(said).is_empty()
                 });
             }
-            for &place in inside.iter().step_by(step) {
+            for &place in &named {
                 p.labels.add(Evidence {
                     utterance,
                     said,
@@ -82,6 +83,22 @@ pub(crate) fn draw(
         filter.weigh_words(talk);
     }
     Ok(text)
+}
+
+/// Of places so many that they lie apart, from the one nearest to the middle of the corners on.
+fn spread(poses: &[Pose2], inside: &[Vertex], corners: &[(f64, f64)]) -> Vec<Vertex> {
+    let n = corners.len() as f64;
+    let middle = corners.iter().fold((0.0, 0.0), |sum, c| (sum.0 + c.0 / n, sum.1 + c.1 / n));
+    let far_m = |v: &Vertex| (poses[*v as usize].x_m - middle.0).hypot(poses[*v as usize].y_m - middle.1);
+    let mut nearest = inside.to_vec();
+    nearest.sort_by(|a, b| far_m(a).total_cmp(&far_m(b)).then(a.cmp(b)));
+    let mut chosen: Vec<Vertex> = Vec::new();
+    for v in nearest {
+        if chosen.iter().all(|c| poses[*c as usize].distance_m(&poses[v as usize]) >= APART_M) {
+            chosen.push(v);
+        }
+    }
+    chosen
 }
 
 /// Denies what was said of places: of each name as much as all sentences say together, each of them once however many places
