@@ -131,8 +131,8 @@ async fn an_area_is_called_and_forbidden() {
     let pose: PoseOut = serde_json::from_value(site.ask(&site.keys.pose("r1"), "").await.unwrap()).unwrap();
     let Pose { x_m, y_m, .. } = pose.map_from_body;
     let drawn = |rest: &str| {
-        let corners =
-            format!("{},{},{},{},{},{}", x_m - 9.0, y_m - 9.0, x_m + 9.0, y_m - 9.0, x_m, y_m + 9.0);
+        let (left, right, low, high) = (x_m - 30.0, x_m + 30.0, y_m - 30.0, y_m + 30.0);
+        let corners = format!("{left},{low},{right},{low},{right},{high},{left},{high}");
         format!("{}?polygon_m={corners};{rest}", site.keys.command("area"))
     };
     for told in ["id=a1;name=den", "id=a2;forbidden=true"] {

@@ -109,8 +109,8 @@ fn frames() -> Vec<Case> {
         // Nothing is left to count on with.
         ("the last number there is", last, Came::Damaged, "no number is left".into()),
         ("zeros behind it", with(&[0; 64]), Came::Damaged, format!("byte {after}: nothing stands here")),
-        ("ones behind it", with(&[1; 64]), Came::Taken, "8 messages, torn".into()),
-        ("a byte behind it", with(&[1]), Came::Taken, "8 messages, torn".into()),
+        ("ones behind it", with(&[1; 64]), Came::Taken, "9 messages, torn".into()),
+        ("a byte behind it", with(&[1]), Came::Taken, "9 messages, torn".into()),
         ("message 2 first", messages(&[(2, &odom)]), Came::Damaged, here("message 2 where 1 is expected")),
         (
             "message 1 twice",
