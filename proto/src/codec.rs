@@ -290,16 +290,11 @@ mod tests {
         #[test]
         fn what_is_mended_survives_a_record(text in "[a-z ]{0,9}x", how in 0..4) {
             use crate::stream::Mend;
+            let polygon_m = vec![[0.0, 0.0], [4.0, 0.0], [4.0, -1e6]];
             let m = Message::Mend(match how {
                 0 => Mend::Undo { id: Some(text) },
                 1 => Mend::Rename { from: text, to: "gym".into() },
-                2 => Mend::Area {
-                    id: "a".into(),
-                    polygon_m: vec![[0.0, 0.0], [4.0, 0.0], [4.0, -1e6]],
-                    name: Some(text),
-                    instead: false,
-                    forbidden: true,
-                },
+                2 => Mend::Area { id: text, polygon_m, name: None, instead: false, forbidden: true },
                 _ => Mend::Forget { name: text },
             });
             let bytes = m.to_bincode().unwrap();

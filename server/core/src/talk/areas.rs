@@ -87,8 +87,7 @@ pub(crate) fn draw(
 
 /// Of places so many that they lie apart, from the one nearest to the middle of the corners on.
 fn spread(poses: &[Pose2], inside: &[Vertex], corners: &[(f64, f64)]) -> Vec<Vertex> {
-    let n = corners.len() as f64;
-    let middle = corners.iter().fold((0.0, 0.0), |sum, c| (sum.0 + c.0 / n, sum.1 + c.1 / n));
+    let middle = middle(corners);
     let far_m = |v: &Vertex| (poses[*v as usize].x_m - middle.0).hypot(poses[*v as usize].y_m - middle.1);
     let mut nearest = inside.to_vec();
     nearest.sort_by(|a, b| far_m(a).total_cmp(&far_m(b)).then(a.cmp(b)));
@@ -135,10 +134,15 @@ fn anchored(poses: &[Pose2], (x, y): (f64, f64)) -> (Vertex, f64, f64) {
     })
 }
 
+/// Of corners.
+fn middle(corners: &[(f64, f64)]) -> (f64, f64) {
+    let n = corners.len() as f64;
+    corners.iter().fold((0.0, 0.0), |sum, c| (sum.0 + c.0 / n, sum.1 + c.1 / n))
+}
+
 fn words(name: Option<&Name>, area: &Area) -> String {
-    let (sum, n) =
-        (area.polygon_m.iter().fold((0.0, 0.0), |s, c| (s.0 + c.0, s.1 + c.1)), area.polygon_m.len());
-    let at = format!("the area about x {:.1} m, y {:.1} m", sum.0 / n as f64, sum.1 / n as f64);
+    let (x_m, y_m) = middle(&area.polygon_m);
+    let at = format!("the area about x {x_m:.1} m, y {y_m:.1} m");
     let rest = if area.forbidden { "robots keep out of it" } else { "" };
     match (name, area.instead) {
         (Some(name), true) => {
