@@ -38,3 +38,4 @@ pub use planner::Planner;
 pub use replay::Replay;
 pub use robot::{Form, Robot, RobotConfig};
 pub use session::{ClientError, Connection, endpoint, open};
+pub use zenoh::Session;

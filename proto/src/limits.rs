@@ -43,6 +43,8 @@ pub struct Limits {
     pub long_queries: usize,
     /// The same of commands, which wait for a map's filter.
     pub commands: usize,
+    /// Connections of browsers and of all else that speaks HTTP; more are closed at once.
+    pub connections: usize,
 }
 
 impl Limits {
@@ -76,6 +78,7 @@ impl Limits {
         short_queries: 64,
         long_queries: 2,
         commands: 2,
+        connections: 256,
     };
 
     /// Checks that none is 0 or beyond what memory and journals can hold.
@@ -98,6 +101,7 @@ impl Limits {
             ("limits.short_queries", self.short_queries, 10_000),
             ("limits.long_queries", self.long_queries, 10_000),
             ("limits.commands", self.commands, 10_000),
+            ("limits.connections", self.connections, 10_000),
         ] {
             if !(1..=max).contains(&value) {
                 return Err(Invalid::new(field, format!("is {value}, must be from 1 to {max}")));

@@ -21,7 +21,11 @@ fn escape(text: &str) -> String {
     text.bytes().map(|b| if plain(b) { char::from(b).to_string() } else { format!("%{b:02X}") }).collect()
 }
 
-fn unescape(text: &str) -> Result<String, Invalid> {
+/// Reads percent-encoding.
+///
+/// # Errors
+/// If it is none, or not of UTF-8.
+pub fn unescape(text: &str) -> Result<String, Invalid> {
     let bad = || Invalid::new("selector", format!("{text:?} is not percent-encoded UTF-8"));
     let mut bytes = Vec::with_capacity(text.len());
     let mut rest = text.as_bytes();

@@ -8,8 +8,8 @@ use std::fmt::Write as _;
 use tokio::io::{AsyncReadExt, AsyncWriteExt};
 use tokio::net::TcpStream;
 use tokio::time::timeout;
-use toponym_proto::Keys;
 use toponym_proto::answer::ErrorReply;
+use toponym_proto::{Keys, Limits};
 use toponym_server::access::{Policy, Role, User};
 use toponym_server::serve::Server;
 
@@ -59,8 +59,13 @@ impl Answered {
 
 /// A server, where its pages are, and its folder.
 async fn start(policy: Option<Policy>) -> (Server, String, Folder) {
+    start_with(policy, Limits::default()).await
+}
+
+async fn start_with(policy: Option<Policy>, limits: Limits) -> (Server, String, Folder) {
     let folder = Folder::new();
     let mut config = settings(&folder);
+    config.limits = limits;
     config.http = Some("127.0.0.1:0".into());
     if let Some(policy) = policy {
         std::fs::create_dir_all(&config.data).unwrap();
@@ -275,6 +280,8 @@ async fn hostile_requests_are_refused_with_an_error_each() {
         ("no name", request("GET", "/map/main/ask/where")),
         ("no such argument", request("GET", "/map/main/ask/where?name=gym&admin=1")),
         ("half an escape", request("GET", "/map/main/ask/where?name=%f")),
+        ("no escape in a path", request("GET", "/map/%zz/tiles")),
+        ("no UTF-8 in a path", request("GET", "/map/%ff/sentences")),
         ("fine grid", request("GET", "/map/main/ask/grid?resolution_m=0.0000001")),
         ("no number", request("GET", "/map/main/ask/what?x_m=NaN&y_m=inf")),
         ("wildcard", request("GET", "/map/*/ask/where?name=gym")),
@@ -350,5 +357,36 @@ async fn users_do_on_pages_what_their_role_may() {
         assert_eq!(ask(request("GET", path), Some(gina)).await != 403, may, "{path}");
     }
     assert_eq!(ask(say(), Some(gina)).await, 403);
+    server.stop().await.unwrap();
+}
+
+#[tokio::test(flavor = "multi_thread")]
+async fn connections_that_say_nothing_leave_room_for_no_more_than_may_be() {
+    let (server, host, _folder) = start_with(None, Limits { connections: 4, ..Limits::default() }).await;
+    let mut silent = Vec::new();
+    for _ in 0..4 {
+        let mut stream = TcpStream::connect(&host).await.unwrap();
+        // An answer tells that the connection was taken.
+        let asks = format!("GET /time HTTP/1.1\r\nhost: {host}\r\n\r\n");
+        stream.write_all(asks.as_bytes()).await.unwrap();
+        assert!(stream.read(&mut [0; 16]).await.unwrap() > 0);
+        silent.push(stream);
+    }
+    let mut fifth = TcpStream::connect(&host).await.unwrap();
+    // Closed, or reset, without a word.
+    let end = timeout(PATIENCE, fifth.read(&mut [0; 16])).await.expect("it was taken");
+    assert!(!matches!(end, Ok(1..)), "{end:?}");
+    // One that ends makes room.
+    drop(silent.pop());
+    let info = loop {
+        let mut stream = TcpStream::connect(&host).await.unwrap();
+        let asks = format!("GET /info HTTP/1.1\r\nhost: {host}\r\nconnection: close\r\n\r\n");
+        let _ = stream.write_all(asks.as_bytes()).await;
+        let mut all = Vec::new();
+        if stream.read_to_end(&mut all).await.is_ok_and(|n| n > 0) {
+            break String::from_utf8_lossy(&all).into_owned();
+        }
+    };
+    assert!(info.contains("\"connections\""), "it is counted: {info}");
     server.stop().await.unwrap();
 }

@@ -12,6 +12,7 @@ use base64::engine::general_purpose::STANDARD;
 use std::sync::Arc;
 use std::sync::atomic::Ordering;
 use toponym_proto::answer::{ErrorCode, Problem};
+use toponym_proto::selector::unescape;
 
 /// What pages may load: what they were served with, and nothing else from anywhere.
 const CONTENT_POLICY: &str = "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' blob: data:; \
@@ -131,6 +132,12 @@ fn admit(guard: &Guard, request: &Request) -> Result<Who, Box<Response>> {
             .field("host")
             .hint("`http_hosts` in the settings names those by which it is reached");
         return Err(no(StatusCode::MISDIRECTED_REQUEST, problem));
+    }
+    if let Err(e) = unescape(request.uri().path()) {
+        return Err(no(
+            StatusCode::BAD_REQUEST,
+            Problem::new(ErrorCode::BadArgument, e.to_string()).field("path"),
+        ));
     }
     let origin = text(header::ORIGIN).map(|origin| origin.split("://").nth(1).unwrap_or_default());
     let is_safe = matches!(*request.method(), Method::GET | Method::HEAD);

@@ -7,7 +7,7 @@
 //! GET  /map/{map}/sentences      what was said, by id
 //! GET  /map/{map}/tiles          the grid in tiles that a page keeps until they change
 //! POST /robot/{robot}/say        a sentence; answers what became of it
-//! POST /do/{command}?…           undo, rename, forget, save, delete
+//! POST /do/{command}?…           undo, rename, forget, area, go, initial_pose, save, delete
 //! GET  /events                   server-sent events: poses, what was heard, maps that changed, jumps
 //! GET  /healthz, /metrics        how the server does
 //! GET  /ca.pem                   beyond this machine: the authority to trust, if `cert new` made it
@@ -17,6 +17,7 @@
 
 mod address;
 mod api;
+mod connections;
 mod events;
 mod guard;
 mod pages;
@@ -24,6 +25,7 @@ mod tiles;
 
 pub use events::{LAST_EVENT, Published};
 
+use self::connections::Bounded;
 use self::guard::Guard;
 use crate::access::Policy;
 use crate::config::{DEFAULT_HTTP, ServerConfig};
@@ -33,6 +35,7 @@ use crate::serve::{queries, watch};
 use axum::Router;
 use axum::middleware::from_fn_with_state;
 use axum::routing::{get, post};
+use axum_server::Server;
 use axum_server::tls_rustls::RustlsConfig;
 use std::io::{self, ErrorKind};
 use std::net::SocketAddr;
@@ -75,7 +78,8 @@ pub async fn serve(
         }
         Err(e) => return Err(io::Error::new(e.kind(), format!("cannot listen on http {address}: {e}"))),
     };
-    let local = listener.local_addr()?;
+    let (local, listener) = (listener.local_addr()?, listener.into_std()?);
+    let bounded = Bounded::new(config.limits.connections, board.clone());
     let health = watch::routes(board.clone());
     let tls = config.access.tls.as_ref().filter(|_| !local.ip().is_loopback() && policy.by_password());
     let pages = |guard| {
@@ -85,7 +89,7 @@ pub async fn serve(
     let served = if local.ip().is_loopback() {
         address::tell_local(local);
         let router = pages(Guard::new(policy, Some(hosts(config, address, local.port()))));
-        tokio::spawn(async move { ended(axum::serve(listener, router).await) })
+        plain(listener, bounded, router)?
     } else if let Some(tls) = tls {
         let authority = address::authority(config);
         address::tell(config, local, authority.is_some());
@@ -95,21 +99,29 @@ pub async fn serve(
             // For whoever does not trust the rest yet, and so has not said who they are.
             router = router.route("/ca.pem", get(move || address::ca(file.clone())));
         }
-        let router = router.into_make_service();
         let tls = RustlsConfig::from_pem_file(&tls.certificate, &tls.key).await?;
-        let mut server =
-            axum_server::from_tcp_rustls(listener.into_std()?, tls)?.first_request_timeout(HEAD_WAIT);
-        // Who says nothing does not keep a connection.
-        server.http_builder().http1().header_read_timeout(HEAD_WAIT);
-        tokio::spawn(async move { ended(server.serve(router).await) })
+        let server = hurried(axum_server::from_tcp_rustls(listener, tls)?).map(|tls| tls.acceptor(bounded));
+        tokio::spawn(async move { ended(server.serve(router.into_make_service()).await) })
     } else {
         warn!(
             "http: /healthz and /metrics alone at {local}: beyond this machine pages need users (`toponym-server user add \
              anna --role guide`) and a certificate (`toponym-server cert new`, [access.tls])"
         );
-        tokio::spawn(async move { ended(axum::serve(listener, health).await) })
+        plain(listener, bounded, health)?
     };
     Ok((served, Some(local)))
+}
+
+fn plain(listener: std::net::TcpListener, bounded: Bounded, router: Router) -> io::Result<JoinHandle<()>> {
+    let server = hurried(axum_server::from_tcp(listener)?).acceptor(bounded);
+    Ok(tokio::spawn(async move { ended(server.serve(router.into_make_service()).await) }))
+}
+
+/// Who says nothing does not keep a connection.
+fn hurried<A>(server: Server<SocketAddr, A>) -> Server<SocketAddr, A> {
+    let mut server = server.first_request_timeout(HEAD_WAIT);
+    server.http_builder().http1().header_read_timeout(HEAD_WAIT);
+    server
 }
 
 fn ended(served: io::Result<()>) {

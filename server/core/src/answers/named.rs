@@ -12,8 +12,8 @@ use crate::geometry::{Pose2, wrap};
 use crate::language::act::Restriction;
 use crate::language::{GroundPlace, READ};
 use crate::regions::{Region, Rooms, Shape};
-use crate::talk::describe::located;
 use crate::talk::ledger::{Entry, Ledger};
+use crate::talk::locate::located;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Arc, OnceLock};
 

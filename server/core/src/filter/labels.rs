@@ -65,12 +65,21 @@ pub fn take_up(spoken: &mut Spoken, e: &Evidence) {
     }
 }
 
+/// Floor round a place, and how likely something described lies on it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Spot {
+    /// The place.
+    pub place: Vertex,
+    /// The probability.
+    pub share: f64,
+}
+
 /// L of one particle: all evidence, in the order it came.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Labels {
     evidence: Arc<Vec<Evidence>>,
-    /// By utterance and figure as said: 1/Z of eq. (16), when last grounded.
-    described: Arc<BTreeMap<(u32, LabelId), f64>>,
+    /// By utterance and figure as said: [`Labels::described`].
+    described: Arc<BTreeMap<(u32, LabelId), Vec<Spot>>>,
 }
 
 impl Labels {
@@ -104,16 +113,16 @@ impl Labels {
         before
     }
 
-    /// How much likelier what an utterance says of a figure is in this map than where nobody knows anything:
-    /// 1/Z of eq. (16), "not there yet" included, so that it says more when it is grounded anew.
-    pub fn described(&self, utterance: u32, figure: LabelId) -> f64 {
-        self.described.get(&(utterance, figure)).copied().unwrap_or(1.0)
+    /// Where the figure of an utterance may lie by what is said of it, eq. (15), whatever it and the floor there are
+    /// called; what the shares lack to one is floor not seen yet.
+    pub fn described(&self, utterance: u32, figure: LabelId) -> &[Spot] {
+        self.described.get(&(utterance, figure)).map_or(&[], Vec::as_slice)
     }
 
     /// Sets [`Labels::described`].
-    pub fn describe(&mut self, utterance: u32, figure: LabelId, ratio: f64) {
-        if self.described.get(&(utterance, figure)) != Some(&ratio) {
-            Arc::make_mut(&mut self.described).insert((utterance, figure), ratio);
+    pub fn describe(&mut self, utterance: u32, figure: LabelId, spots: Vec<Spot>) {
+        if self.described(utterance, figure) != spots {
+            Arc::make_mut(&mut self.described).insert((utterance, figure), spots);
         }
     }
 
@@ -156,15 +165,9 @@ impl Labels {
         self.applies_if(|e| e.label == label)
     }
 
-    /// The same without what one utterance says, what it describes is not its own evidence, and by what counts
-    /// only.
-    pub fn applies_by_others(
-        &self,
-        label: LabelId,
-        utterance: u32,
-        counts: impl Fn(&Evidence) -> bool,
-    ) -> BTreeMap<Vertex, f64> {
-        self.applies_if(|e| e.label == label && e.utterance != utterance && counts(e))
+    /// The same without what one utterance says: what it describes is not its own evidence.
+    pub fn applies_by_others(&self, label: LabelId, utterance: u32) -> BTreeMap<Vertex, f64> {
+        self.applies_if(|e| e.label == label && e.utterance != utterance)
     }
 
     fn applies_if(&self, wanted: impl Fn(&Evidence) -> bool) -> BTreeMap<Vertex, f64> {

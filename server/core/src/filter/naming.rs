@@ -14,6 +14,7 @@
 //! is left of the name's share in the base; else f_l is 1.
 
 use crate::geometry::Pose2;
+use crate::language::COMMON;
 use std::collections::BTreeMap;
 
 /// Index of a name in the ledger.
@@ -30,6 +31,13 @@ const DOUBT: f64 = FALSE_TALK / (1.0 - FALSE_TALK);
 const NAMES: f64 = 150.0;
 /// The same of ways: a hallway is called a hallway wherever it is.
 const NAMES_OF_WAYS: f64 = 2.0;
+/// γ: concentration of p₀ over names not said yet. When ten rooms were told of, three in four of the next have a name
+/// that was not said: assumed.
+const NEW_NAMES: f64 = 30.0;
+/// Discount: what each name said counts less, as rooms are named to be told apart (Pitman, Yor, 1997): assumed.
+const DISCOUNT: [f64; 2] = [0.8, 0.0];
+/// Share of rooms that bear one of the [`COMMON`] names: assumed.
+const COMMON_SHARE: f64 = 0.5;
 /// How near two places are for what is said of one to be expected of the other: standard deviation
 /// of a Gaussian kernel, the size of a room.
 const JOINED_M: f64 = 3.0;
@@ -207,26 +215,45 @@ impl Spoken {
     }
 }
 
-/// p₀: how often a name is said of anything of its class. Names of ways and of rooms are no rivals: who stands in
-/// a door says either.
+/// p₀: how often a name is said of anything of its class, (n_l − d)⁺ + (γ + Σ_k min(n_k, d)) s_l over n + γ with n_l
+/// utterances, discount d, and shares s_l of names not said yet. Names of ways and of rooms are no rivals: who stands
+/// in a door says either.
 #[derive(Clone, Debug, Default)]
 pub struct BaseMeasure {
-    /// Utterances by name.
+    /// By name: how often it was said, of a way or not, and its share of what is said first.
     times: Vec<f64>,
-    /// Which names are those of ways.
     ways: Vec<bool>,
-    /// Utterances of either class, and names said or that might be.
+    shares: Vec<f64>,
+    /// Such a share of a name that is none of these.
+    other: f64,
+    /// Utterances of either class, what is discounted of them, and γ.
     all: [f64; 2],
-    names: [f64; 2],
+    discounted: [f64; 2],
+    new: [f64; 2],
 }
 
 impl BaseMeasure {
-    /// Of the names in the ledger, each of a way or not, none said yet.
-    pub fn new(ways: Vec<bool>) -> Self {
-        let of_ways = ways.iter().filter(|w| **w).count() as f64;
-        let of_rooms = ways.len() as f64 - of_ways;
-        let names = [NAMES.max(of_rooms + 1.0), NAMES_OF_WAYS.max(of_ways + 1.0)];
-        Self { times: vec![0.0; ways.len()], ways, all: [0.0; 2], names }
+    /// Of the names in the ledger, each of a way or not and common or not, none said yet.
+    pub fn new(names: &[(bool, bool)]) -> Self {
+        let of_ways = names.iter().filter(|name| name.0).count() as f64;
+        let of_rooms = names.len() as f64 - of_ways;
+        let ways = NAMES_OF_WAYS.max(of_ways + 1.0);
+        let common = COMMON.len() as f64;
+        let other = (1.0 - COMMON_SHARE) / (NAMES.max(of_rooms + common + 1.0) - common);
+        let share = |&(is_way, is_common): &(bool, bool)| match (is_way, is_common) {
+            (true, _) => 1.0 / ways,
+            (false, true) => COMMON_SHARE / common,
+            (false, false) => other,
+        };
+        Self {
+            times: vec![0.0; names.len()],
+            ways: names.iter().map(|name| name.0).collect(),
+            shares: names.iter().map(share).collect(),
+            other,
+            all: [0.0; 2],
+            discounted: [0.0; 2],
+            new: [NEW_NAMES, ways],
+        }
     }
 
     /// Whether a name is that of a way.
@@ -236,18 +263,29 @@ impl BaseMeasure {
 
     /// A name was said, with a probability.
     pub fn count(&mut self, label: LabelId, units: f64) {
+        let class = usize::from(self.is_way(label));
+        let times = self.times[label as usize];
+        self.discounted[class] += (times + units).min(DISCOUNT[class]) - times.min(DISCOUNT[class]);
+        self.all[class] += units;
         self.times[label as usize] += units;
-        self.all[usize::from(self.is_way(label))] += units;
     }
 
     /// p₀(l) by all other sentences than one that said some names itself.
     pub fn probability(&self, label: LabelId, itself: &[(LabelId, f64)]) -> f64 {
-        let is_way = self.is_way(label);
-        let own = |of: &dyn Fn(LabelId) -> bool| itself.iter().filter(|o| of(o.0)).map(|o| o.1).sum::<f64>();
-        let times = self.times.get(label as usize).copied().unwrap_or(0.0) - own(&|l| l == label);
-        let class = usize::from(is_way);
-        let all = self.all[class] - own(&|l| self.is_way(l) == is_way);
-        (times.max(0.0) + 1.0) / (all.max(0.0) + self.names[class])
+        let class = usize::from(self.is_way(label));
+        let times = |l: LabelId| self.times.get(l as usize).copied().unwrap_or(0.0);
+        let (mut times_l, mut all, mut discounted) = (times(label), self.all[class], self.discounted[class]);
+        for &(l, units) in itself.iter().filter(|own| usize::from(self.is_way(own.0)) == class) {
+            let others = (times(l) - units).max(0.0);
+            all -= units;
+            discounted -= times(l).min(DISCOUNT[class]) - others.min(DISCOUNT[class]);
+            if l == label {
+                times_l = others;
+            }
+        }
+        let share = self.shares.get(label as usize).copied().unwrap_or(self.other);
+        let (new, said) = (self.new[class], (times_l - DISCOUNT[class]).max(0.0));
+        (said + (new + discounted) * share) / (all.max(0.0) + new)
     }
 }
 
@@ -276,16 +314,20 @@ mod tests {
 
     #[test]
     fn base_rates_sum_to_one_over_what_may_be_said() {
-        let mut base = BaseMeasure::new(vec![false, false, false, true]);
-        for (label, units) in [(0, 1.0), (0, 0.5), (2, 1.0), (3, 4.0)] {
+        let (way, common, other) = ((true, false), (false, true), (false, false));
+        let mut names = vec![other, other, way];
+        names.extend([common; COMMON.len()]);
+        let mut base = BaseMeasure::new(&names);
+        for (label, units) in [(0, 1.0), (0, 0.5), (3, 1.0), (2, 4.0)] {
             base.count(label, units);
         }
         for own in [&[][..], &[(0, 0.5)]] {
-            // The other 147 names are as rare as one never said.
-            let sum = (0..3).map(|l| base.probability(l, own)).sum::<f64>()
-                + (NAMES - 3.0) * base.probability(99, own);
+            let said = (0..names.len() as LabelId).filter(|l| *l != 2).map(|l| base.probability(l, own));
+            let unsaid = NAMES - COMMON.len() as f64 - 2.0;
+            let sum = said.sum::<f64>() + unsaid * base.probability(9999, own);
             assert!((sum - 1.0).abs() < 1e-12);
         }
-        assert!(base.probability(3, &[]) > 0.5, "a hallway is called so");
+        assert!(base.probability(2, &[]) > 0.5, "a hallway is called so");
+        assert!(base.probability(4, &[]) > 2.0 * base.probability(1, &[]), "many rooms are offices");
     }
 }

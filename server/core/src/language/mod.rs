@@ -52,6 +52,7 @@ pub use grounding::paper::ground_by_paper;
 pub use grounding::path_features::{FEATURES, path_features};
 pub use grounding::place::GroundPlace;
 pub use grounding::scales::Scales;
+pub use lexicon::COMMON;
 pub use lexicon::edits::edits;
 pub use lexicon::names::Name;
 pub use lexicon::normalise::MAX_TEXT_BYTES;

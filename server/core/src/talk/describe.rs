@@ -3,29 +3,35 @@
 
 use crate::edge::Vertex;
 use crate::filter::Filter;
-use crate::filter::labels::{Evidence, LabelId, Labels, Source};
+use crate::filter::floors::Floors;
+use crate::filter::labels::{Evidence, LabelId, Labels, Source, Spot};
 use crate::filter::particle::Particle;
 use crate::filter::second_look::gained;
 use crate::geometry::Pose2;
-use crate::language::act::{
-    Analysis, Content, Distance, Head, Locate, Modifiers, Ordinal, Parse, Phrase, Restriction,
-};
-use crate::language::{
-    GroundPlace, Grounding, LandmarkBelief, Narrowing, Reading, Relation, ground_by_paper, ground_clause,
-    pointed_to, seen_from_here,
-};
+use crate::language::act::{Head, Locate, Parse, Phrase, Restriction};
+use crate::language::{GroundPlace, Grounding, LandmarkBelief, Reading, ground_by_paper, ground_clause};
 use crate::talk::ledger::Ledger;
+use crate::talk::locate::{located, narrowing};
 use crate::talk::{Here, Talk};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
+/// Squares of floor that a description is weighed by, and the likeliest that are.
+const SPOT_M: f64 = 2.0;
+const SPOTS_MAX: usize = 32;
+/// A landmark that is less probable tells nothing of where the figure is.
+const MEANT_MIN: f64 = 0.1;
 /// Groundings less probable are not kept.
 const GROUNDED_MIN: f64 = 0.002;
 /// Descriptions grounded again per place, in turn.
 const AGAIN_PER_PLACE: usize = 1;
 /// "This hallway" and "the nearest exit" are about so near.
 const THIS_M: f64 = 10.0;
+/// Of several places called alike a far one is meant so often for once that the one at hand is, and a way at hand that
+/// nobody named: assumed, both.
+const FAR: f64 = 0.1;
+const UNNAMED: f64 = 0.05;
 
 /// Grounds what a sentence locates in every particle, anew if it was before. `poses` of a particle's
 /// places, with the path travelled up to each.
@@ -45,18 +51,21 @@ pub(crate) fn ground(
         ledger.enter_name(name);
     }
     let (ledger, by_paper) = (&talk.ledger, filter.config.rules.by_paper());
+    let vague = filter.graph.stretches.vague();
     let ground = |p: &mut Particle| {
+        let floors = Floors::of(&vague, p);
         let scene = Scene {
             places: places(&poses(p), path_m),
+            floors: &floors,
             labels: &p.labels,
             ledger,
             utterance,
             held: held as usize,
             by_paper,
         };
-        let (grounded, ratios) = scene.grounded(parse);
-        for (figure, ratio) in ratios {
-            p.labels.describe(utterance, figure, ratio);
+        let (grounded, described) = scene.grounded(parse);
+        for (figure, spots) in described {
+            p.labels.describe(utterance, figure, spots);
         }
         gained(&p.labels.reground(utterance, &grounded), &grounded)
     };
@@ -118,6 +127,7 @@ fn places(poses: &[Pose2], path_m: &[f64]) -> Vec<GroundPlace> {
 /// One particle's map, seen from where the sentence was said.
 struct Scene<'a> {
     places: Vec<GroundPlace>,
+    floors: &'a Floors,
     labels: &'a Labels,
     ledger: &'a Ledger,
     utterance: u32,
@@ -126,9 +136,9 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
-    /// Δα of all that a sentence locates: for each figure a clause, summed over its readings. Beside it
-    /// for each how much likelier it is here than where nobody knows anything.
-    fn grounded(&self, parse: &Parse) -> (Vec<Evidence>, Vec<(LabelId, f64)>) {
+    /// Δα of all that a sentence locates: for each figure a clause, summed over its readings. Beside it for each
+    /// where it may lie, whatever is called how.
+    fn grounded(&self, parse: &Parse) -> (Vec<Evidence>, Vec<(LabelId, Vec<Spot>)>) {
         let mut clauses: BTreeMap<LabelId, Vec<(f64, Locate)>> = BTreeMap::new();
         for (certainty, l) in located(parse) {
             let said = l.figure.label().and_then(|name| self.ledger.said(name.as_str()));
@@ -137,14 +147,12 @@ impl Scene<'_> {
                 clauses.entry(said).or_default().push((certainty, l));
             }
         }
-        let (mut grounded, mut ratios) = (Vec::new(), Vec::new());
+        let (mut grounded, mut described) = (Vec::new(), Vec::new());
         for (said, readings) in clauses {
             let label = self.ledger.meant(said);
             let certainty = readings.iter().map(|r| r.0).sum::<f64>().min(1.0);
             let grounding = self.place_of(&readings, label);
-            // Given all names, and of other descriptions those before: each pair is told once.
-            let before = |e: &Evidence| e.source != Source::Grounded || e.utterance < self.utterance;
-            ratios.push((said, grounding.likelihood_ratio_by(&self.applies(label, before))));
+            described.push((said, self.spots(&readings, &grounding.floor)));
             let p = grounding.p;
             grounded.extend(p.iter().enumerate().filter(|(_, p)| *p * certainty >= GROUNDED_MIN).map(
                 |(v, p)| {
@@ -153,7 +161,33 @@ impl Scene<'_> {
                 },
             ));
         }
-        (grounded, ratios)
+        (grounded, described)
+    }
+
+    /// The likeliest floor, in squares of [`SPOT_M`], each by its likeliest place. Where a map lays floors one over the
+    /// other that nothing ties, only those count that the speaker or a landmark is on.
+    fn spots(&self, readings: &[(f64, Locate)], shares: &[f64]) -> Vec<Spot> {
+        let landmarks = readings.iter().flat_map(|(_, l)| &l.landmarks).flat_map(|l| self.landmark(l));
+        let meant = landmarks.filter(|(_, p)| *p > MEANT_MIN).map(|(v, _)| self.floor(v));
+        let floors: BTreeSet<usize> = meant.chain([self.floor(self.held)]).collect();
+        let mut squares: BTreeMap<(usize, i64, i64), (f64, Spot)> = BTreeMap::new();
+        for (v, &share) in shares.iter().enumerate().filter(|(_, share)| **share > 0.0) {
+            let (at, place, floor) = (&self.places[v], v as Vertex, self.floor(v));
+            if !floors.contains(&floor) {
+                continue;
+            }
+            let square = |m: f64| (m / SPOT_M).floor() as i64;
+            let key = (floor, square(at.x_m), square(at.y_m));
+            let (most, spot) = squares.entry(key).or_insert((0.0, Spot { place, share: 0.0 }));
+            spot.share += share;
+            if share > *most {
+                (*most, spot.place) = (share, place);
+            }
+        }
+        let mut spots: Vec<Spot> = squares.into_values().map(|(_, spot)| spot).collect();
+        spots.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.place.cmp(&b.place)));
+        spots.truncate(SPOTS_MAX);
+        spots
     }
 
     /// p(figure is place i | λ), eq. (14), given what is located as its readings say.
@@ -166,7 +200,7 @@ impl Scene<'_> {
             let of_first = landmarks[0].first().into_iter().flatten();
             let likeliest = of_first.max_by(|a, b| a.1.total_cmp(&b.1).then(b.0.cmp(&a.0)));
             let p = ground_by_paper(clause[0].1.relation, &self.places, likeliest.map(|l| l.0));
-            return Grounding { p, p_elsewhere: 0.0, likelihood_ratio: 1.0, ratios: Vec::new() };
+            return Grounding { p, p_elsewhere: 0.0, floor: Vec::new() };
         }
         let beliefs: Vec<Vec<LandmarkBelief>> = clause
             .iter()
@@ -185,7 +219,7 @@ impl Scene<'_> {
                 landmarks,
             })
             .collect();
-        ground_clause(&readings, &self.places, self.held, &self.applies(figure, |_| true))
+        ground_clause(&readings, &self.places, self.held, &self.applies(figure))
     }
 
     /// Where a landmark may be: (place, probability), summing to at most one; empty if nobody knows.
@@ -193,20 +227,16 @@ impl Scene<'_> {
         let mut p: Vec<f64> = match (&phrase.head, phrase.label()) {
             (Head::Here | Head::Agent | Head::Speaker | Head::Path, _) => return vec![(self.held, 1.0)],
             (_, Some(name)) => match self.ledger.label(name.as_str()) {
-                Some(label) => self.applies(label, |_| true),
+                Some(label) => self.applies(label),
                 None => Vec::new(),
             },
             _ => Vec::new(),
         };
-        if phrase.features.this || phrase.features.nearest {
-            let here = self.places[self.held];
-            for (p, place) in p.iter_mut().zip(&self.places) {
-                *p *= (-(place.x_m - here.x_m).hypot(place.y_m - here.y_m) / THIS_M).exp();
-            }
-            // "This hallway" is the one we are in, even if nobody named it.
-            if phrase.features.this && p.iter().all(|p| *p < GROUNDED_MIN) {
-                return vec![(self.held, 1.0)];
-            }
+        let is_near = phrase.features.this || phrase.features.nearest;
+        self.prefer_near(&mut p, is_near, phrase.label().is_some_and(|name| name.is_way()));
+        // "This hallway" is the one we are in, even if nobody named it.
+        if phrase.features.this && p.iter().all(|p| *p < GROUNDED_MIN) {
+            return vec![(self.held, 1.0)];
         }
         for restriction in &phrase.within {
             self.restrict(&mut p, restriction);
@@ -214,6 +244,27 @@ impl Scene<'_> {
         // One landmark is meant: what applies to several is shared among them.
         let sum = p.iter().sum::<f64>().max(1.0);
         p.into_iter().enumerate().filter(|(_, p)| *p > 0.0).map(|(i, p)| (i, p / sum)).collect()
+    }
+
+    /// Of several that are called so the near one is meant, mostly, and of ways the one at hand, named or not; `is_near`:
+    /// said to be near.
+    fn prefer_near(&self, p: &mut [f64], is_near: bool, is_way: bool) {
+        let Some(here) = self.places.get(self.held) else { return };
+        let told: f64 = p.iter().sum();
+        for (v, (p, place)) in p.iter_mut().zip(&self.places).enumerate() {
+            let is_here = self.floor(v) == self.floor(self.held);
+            let near = (-(place.x_m - here.x_m).hypot(place.y_m - here.y_m) / THIS_M).exp();
+            let near = if is_here { near } else { 0.0 };
+            // What nobody had seen by then is meant where it is at hand alone.
+            let far = if is_near || is_way || v > self.held { 0.0 } else { FAR };
+            *p *= near + far;
+        }
+        let left: f64 = p.iter().sum::<f64>() + if is_way { UNNAMED } else { 0.0 };
+        // A room alone is meant wherever it is.
+        if !is_near && left > 0.0 {
+            let scale = told.min(1.0) / left;
+            p.iter_mut().for_each(|p| *p *= scale);
+        }
     }
 
     /// "The lounge *by the stairs*": of the places so called those that lie so, (15–16).
@@ -230,57 +281,15 @@ impl Scene<'_> {
         }
     }
 
-    /// P(name applies) at every place, by what other sentences said, those of them that count.
-    fn applies(&self, label: LabelId, counts: impl Fn(&Evidence) -> bool) -> Vec<f64> {
-        let applies = self.labels.applies_by_others(label, self.utterance, counts);
-        (0..self.places.len() as Vertex).map(|v| applies.get(&v).copied().unwrap_or(0.0)).collect()
+    /// The floor of a place.
+    fn floor(&self, place: usize) -> usize {
+        self.floors.floor(self.floors.part(place as Vertex))
     }
-}
 
-/// What the readings of a text locate, each with the probability that it is said and meant.
-pub(crate) fn located(parse: &Parse) -> Vec<(f64, Locate)> {
-    let of = |a: &Analysis| located_by(a).into_iter().map(|(p, l)| (a.weight * p, l)).collect::<Vec<_>>();
-    parse.analyses.iter().flat_map(of).collect()
-}
-
-/// What one reading locates, each with the probability that it is meant.
-pub(crate) fn located_by(reading: &Analysis) -> Vec<(f64, Locate)> {
-    let of = |content: &Content| match content {
-        Content::Label { at, what, .. } if at.head == Head::There => Some(pointed_to(what)),
-        Content::Locate(l) if l.figure.head == Head::Here => seen_from_here(l),
-        Content::Locate(l) => Some(by_doors(l)),
-        // "The last office on the left is Nick's".
-        Content::Alias { what, also } => described(also, what),
-        Content::Correct { is, .. } => match &**is {
-            Content::Locate(l) => Some(by_doors(l)),
-            _ => None,
-        },
-        _ => None,
-    };
-    let there = |l: &Locate| l.relation == Relation::At && l.landmarks.iter().any(|p| p.head == Head::There);
-    let all = reading.acts.iter().filter_map(|act| Some((act.certainty, of(&act.content)?)));
-    all.map(|(p, l)| (p, if there(&l) { pointed_to(&l.figure) } else { l })).collect()
-}
-
-/// "It is the second door on the left": what is at a described spot lies as that is described.
-fn by_doors(l: &Locate) -> Locate {
-    let is_counted = |p: &&Phrase| p.features.ordinal.is_some() || p.features.count.is_some();
-    let spot = l.landmarks.first().filter(is_counted).filter(|_| l.relation == Relation::At);
-    spot.and_then(|spot| described(&l.figure, spot)).unwrap_or_else(|| l.clone())
-}
-
-/// A figure that lies as a phrase says: "the second door *on the left*".
-fn described(figure: &Phrase, as_said: &Phrase) -> Option<Locate> {
-    let Restriction { relation, modifiers, landmarks } = as_said.within.first()?.clone();
-    let modifiers = Modifiers { count: counted(as_said).or(modifiers.count), ..modifiers };
-    Some(Locate { figure: figure.clone(), relation, modifiers, landmarks, frame: None, repaired: false })
-}
-
-/// "The second door", "two doors".
-fn counted(phrase: &Phrase) -> Option<u32> {
-    match phrase.features.ordinal {
-        Some(Ordinal::Nth(n)) => Some(n),
-        _ => phrase.features.count,
+    /// P(name applies) at every place, by what other sentences said.
+    fn applies(&self, label: LabelId) -> Vec<f64> {
+        let applies = self.labels.applies_by_others(label, self.utterance);
+        (0..self.places.len() as Vertex).map(|v| applies.get(&v).copied().unwrap_or(0.0)).collect()
     }
 }
 
@@ -290,99 +299,5 @@ fn belief<'a>(phrase: &Phrase, places: &'a [(usize, f64)]) -> LandmarkBelief<'a>
     LandmarkBelief { places, way }
 }
 
-/// "Just", "twenty meters", "the second door".
-pub(crate) fn narrowing(modifiers: &Modifiers, landmark: Option<&Phrase>) -> Narrowing {
-    let nth = landmark.and_then(counted);
-    let distance_m = modifiers.distance.map(Distance::metres);
-    Narrowing { just: modifiers.just, distance_m, doors: nth.or(modifiers.count) }
-}
-
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::config::Config;
-    use crate::effects::HeardStatus;
-    use crate::event::Utterance;
-    use crate::language::Name;
-    use crate::language::grammar::parse::parse;
-    use crate::smoothing::Factor;
-    use nalgebra::{Matrix3, Vector3};
-
-    #[test]
-    fn a_door_counted_along_the_way_is_located_and_may_be_whose() {
-        for (text, relation, count) in [
-            ("the kitchen is the second door on the left", Relation::LeftSide, Some(2)),
-            ("the second office on the left is Nick's", Relation::LeftSide, Some(2)),
-            ("two doors down from here is the server room", Relation::Down, Some(2)),
-            ("the last office on the right is Nick's", Relation::RightSide, None),
-        ] {
-            let parse = parse(text);
-            let all = located(&parse);
-            let (_, l) = all.first().unwrap_or_else(|| panic!("{text} {}", parse.notation()));
-            assert_eq!((l.relation, l.modifiers.count), (relation, count), "{text}");
-            assert!(l.figure.label().is_some(), "{text}");
-        }
-    }
-
-    #[test]
-    fn what_lies_there_or_here_is_located_from_here() {
-        for (text, relation) in [
-            ("that is the gym", Relation::Near),
-            ("the gym is over there", Relation::Near),
-            ("the room over there is the gym", Relation::Near),
-            ("the gym is down the hall", Relation::Down),
-            ("we are right outside the gym", Relation::NextTo),
-        ] {
-            let all = located(&parse(text));
-            assert_eq!((all[0].1.figure.label(), all[0].1.relation), (Name::new("gym"), relation), "{text}");
-        }
-        assert!(located(&parse("this is the gym")).is_empty());
-    }
-
-    /// Two particles that know a gym and a kitchen, in the first 20 m and in the second 3 m apart, and the
-    /// log-weight of the second over that of the first once a sentence is said on the way.
-    fn weighed(sentence: &str) -> f64 {
-        let (mut talk, mut filter) = (Talk::default(), Filter::new(Config::default()));
-        let structure = Arc::make_mut(&mut filter.structure);
-        for _ in 0..21 {
-            let information = Matrix3::from_diagonal(&Vector3::new(100.0, 100.0, 1e6));
-            structure.add_pose(Pose2::new(1.0, 0.0, 0.0), &information).unwrap();
-        }
-        let i_from_j = Pose2::new(3.0, 0.0, 0.0);
-        let tie =
-            structure.add_factor(Factor { i: 0, j: 20, i_from_j, information: Matrix3::identity() * 1e6 });
-        structure.arrange();
-        let mut apart = Particle::empty();
-        let mut near = Particle::empty();
-        near.belief.hold(tie.unwrap());
-        for p in [&mut apart, &mut near] {
-            p.update(structure).unwrap();
-        }
-        filter.particles = vec![apart, near];
-        let path_m: Vec<f64> = (0..21).map(f64::from).collect();
-        for (held, text) in [(0, "this is the gym"), (20, "this is the kitchen"), (10, sentence)] {
-            let here = Here {
-                held: Some(held),
-                poses: &|p| p.belief.poses(),
-                path_m: path_m.clone(),
-                part: vec![],
-                dark: vec![],
-            };
-            let u = Utterance { id: text.into(), text: text.into(), ..Utterance::default() };
-            assert_eq!(talk.hear(&mut filter, &u, &here).0.status, HeardStatus::Understood);
-        }
-        let length_m = |p: &Particle| p.belief.pose(20).x_m;
-        let (near, apart): (Vec<_>, Vec<_>) = filter.particles.iter().partition(|p| length_m(p) < 10.0);
-        near[0].log_weight - apart[0].log_weight
-    }
-
-    #[test]
-    fn a_sentence_speaks_for_the_map_in_which_it_is_true() {
-        let nothing = weighed("the lounge is near the cafe");
-        assert!(weighed("the kitchen is near the gym") > nothing + 0.5);
-        assert!(weighed("the kitchen is twenty meters from the gym") < nothing - 1.0);
-        assert!(weighed("this is where we started") > nothing + 1.0);
-        assert!(weighed("this is not where we started") < nothing - 1.0);
-        assert!(weighed("this is the same place as the gym") > nothing + 1.0);
-    }
-}
+mod tests;

@@ -1,18 +1,24 @@
 //! p(λ | G): all claims folded in the order said, over one particle's map. A pure function of ledger, poses
-//! and how well the descriptions fit there.
+//! and where descriptions are grounded there.
 //!
-//! Names come first, each given those before it ([`crate::filter::naming`]); descriptions are given all names, so
-//! nothing is told twice. Readings are alternatives, and so are the claim and its being said of nothing:
+//! Each is given those before it, names and descriptions by one model ([`crate::filter::naming`]): what is described
+//! is called so where it lies, on floor i with probability s_i, eq. (15), or on floor not seen yet, which may be called
+//! anything. So a description speaks for maps that have what is called so there, and against such as have all
+//! floor there called otherwise. Readings are alternatives, and so are the claim and its being said of nothing:
 //!
 //! ```text
 //! log p(λ_n | G, λ_<n) − log p₀ = log( Σ_r w_r Π_c (q_c ratio_c + 1 − q_c) + 1 − Σ_r w_r )
+//! ratio(described l)            = (1 − ε) (Σ_i s_i p(l | λ_<n at i) / p₀(l) + 1 − Σ_i s_i) + ε
 //! ```
 
+mod said;
+
+use self::said::{Joined, Told, Units};
 use crate::edge::Vertex;
 use crate::filter::floors::Floors;
-use crate::filter::labels::LabelId;
+use crate::filter::labels::{LabelId, Spot};
 use crate::filter::naming::{
-    BASE, BaseMeasure, Near, REACH_M, Site, Support, Tally, share, share_between, unless_false,
+    BASE, BaseMeasure, Near, REACH_M, Site, Support, share, share_between, unless_false,
 };
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
@@ -55,102 +61,30 @@ pub fn log_likelihood(talk: &Talk, vague: &[&Stretch], particle: &Particle) -> f
         fold.hear(t, units);
     }
     let log_ratios = new.iter().map(|(t, units)| {
-        let ratio = fold.ratio(t, units) * fold.introduced(t);
+        let ratio = fold.ratio(t) * fold.introduced(t);
         fold.hear(t, units);
         ratio.ln()
     });
     log_ratios.sum()
 }
 
-/// What an utterance says of a name at a place: at most one in all its readings.
-#[derive(Clone, Copy)]
-struct Units {
-    place: Vertex,
-    label: LabelId,
-    tally: Tally,
+/// p(l | what was said near) / p₀(l), in two parts.
+struct Predicted {
+    /// By what was told to be called so.
+    known: f64,
+    /// By the base measure: something new.
+    new: f64,
 }
 
-impl Talk {
-    /// What was not taken back, and what it says of names.
-    fn standing(&self) -> Vec<(&Testimony, Vec<Units>)> {
-        let stands = |u: u32| self.ledger.entries().get(u as usize).is_some_and(|e| e.stands);
-        self.testimonies.iter().filter(|t| stands(t.utterance)).map(|t| (t, self.units(t))).collect()
-    }
-
-    /// What a name as said in an utterance means, unless it was forgotten since.
-    fn meant(&self, utterance: u32, said: LabelId) -> Option<LabelId> {
-        let label = self.ledger.meant(said);
-        self.ledger.speaks_of(utterance, label).then_some(label)
-    }
-
-    /// Names of rooms that an utterance speaks of.
-    fn names(&self, testimony: &Testimony) -> impl Iterator<Item = LabelId> {
-        let claims = testimony.readings.iter().flat_map(|r| &r.claims);
-        let said = claims.filter_map(|(_, claim)| claim.name());
-        said.filter_map(|said| self.meant(testimony.utterance, said))
-            .filter(|&label| !self.ledger.is_way(label))
-    }
-
-    fn units(&self, testimony: &Testimony) -> Vec<Units> {
-        let mut units: Vec<Units> = Vec::new();
-        for Claims { weight, claims } in &testimony.readings {
-            for &(certainty, claim) in claims {
-                let one = weight * certainty;
-                let (place, said, tally) = match claim {
-                    Claim::Called { place, said, .. } => (place, said, Tally { said: one, denied: 0.0 }),
-                    Claim::Denied { place, said } => (place, said, Tally { said: 0.0, denied: one }),
-                    _ => continue,
-                };
-                let Some(label) = self.meant(testimony.utterance, said) else { continue };
-                match units.iter_mut().find(|u| (u.place, u.label) == (place, label)) {
-                    Some(known) => known.tally.add(tally, 1.0),
-                    None => units.push(Units { place, label, tally }),
-                }
-            }
-        }
-        for Units { tally, .. } in &mut units {
-            *tally = Tally { said: tally.said.min(1.0), denied: tally.denied.min(1.0) };
-        }
-        units
-    }
+/// p(l is there | what was said) / p₀(l) of where what is described may lie, and of floor not seen yet.
+struct Figure {
+    spots: Vec<(Vertex, f64)>,
+    unseen: f64,
 }
 
-/// The evidence joined with one place, by name.
-struct Joined {
-    of: Vec<Tally>,
-    /// Names with any.
-    names: Vec<LabelId>,
-}
-
-impl Joined {
-    fn of(names: usize) -> Self {
-        Self { of: vec![Tally::default(); names], names: Vec::new() }
-    }
-
-    fn clear(&mut self) {
-        for &label in &self.names {
-            self.of[label as usize] = Tally::default();
-        }
-        self.names.clear();
-    }
-
-    fn add(&mut self, label: LabelId, tally: Tally, share: f64) {
-        let known = &mut self.of[label as usize];
-        if *known == Tally::default() {
-            self.names.push(label);
-        }
-        known.add(tally, share);
-    }
-
-    /// Σ_k (α_k + α₀ p₀(k) f_k) over the names of one class.
-    fn total(&self, is_of_class: impl Fn(LabelId) -> bool, p0: impl Fn(LabelId) -> f64) -> f64 {
-        let of = |&label: &LabelId| {
-            let tally = self.of[label as usize];
-            let left = tally.left();
-            let denied = if left < 1.0 { BASE * p0(label) * (1.0 - left) } else { 0.0 };
-            tally.concentration() - denied
-        };
-        BASE + self.names.iter().filter(|&&label| is_of_class(label)).map(of).sum::<f64>()
+impl Figure {
+    fn ratio(&self) -> f64 {
+        self.spots.iter().map(|spot| spot.1).sum::<f64>() + self.unseen
     }
 }
 
@@ -164,7 +98,7 @@ struct Fold<'a> {
     numbers: BTreeMap<Vertex, usize>,
     near: Near,
     /// What was said of each site so far.
-    told: Vec<Vec<(LabelId, Tally)>>,
+    told: Vec<Vec<(LabelId, Told)>>,
     joined: Joined,
     /// Names that were spoken of so far, and where.
     mentioned: BTreeSet<LabelId>,
@@ -180,16 +114,23 @@ impl<'a> Fold<'a> {
         standing: &[(&Testimony, Vec<Units>)],
     ) -> Self {
         let names = talk.ledger.names().len();
-        let mut base =
-            BaseMeasure::new((0..names as LabelId).map(|label| talk.ledger.is_way(label)).collect());
+        let kind = |label| (talk.ledger.is_way(label), talk.ledger.is_common(label));
+        let mut base = BaseMeasure::new(&(0..names as LabelId).map(kind).collect::<Vec<_>>());
         let (mut numbers, mut sites) = (BTreeMap::new(), Vec::new());
-        for units in standing.iter().flat_map(|(_, units)| units) {
-            base.count(units.label, units.tally.said);
-            if let Some(site) = site(talk, &floors, particle, units.place) {
-                numbers.entry(units.place).or_insert_with(|| {
-                    sites.push(site);
-                    sites.len() - 1
-                });
+        for (testimony, units) in standing {
+            for (label, times) in talk.said(testimony) {
+                base.count(label, times);
+            }
+            let spots = talk.described(testimony).flat_map(|(_, _, said)| {
+                particle.labels.described(testimony.utterance, said).iter().map(|spot| spot.place)
+            });
+            for place in units.iter().map(|u| u.place).chain(spots) {
+                if let Some(site) = site(talk, &floors, particle, place) {
+                    numbers.entry(place).or_insert_with(|| {
+                        sites.push(site);
+                        sites.len() - 1
+                    });
+                }
             }
         }
         let told = vec![Vec::new(); sites.len()];
@@ -208,26 +149,41 @@ impl<'a> Fold<'a> {
     }
 
     fn hear(&mut self, testimony: &Testimony, units: &[Units]) {
+        let described = self.described(testimony);
         self.mentioned.extend(self.talk.names(testimony));
         if testimony.is_pose() {
             return;
         }
         self.spoken_at.insert(self.talk.ledger.entries()[testimony.utterance as usize].held);
-        for Units { place, label, tally } in units {
+        for Units { place, label, told } in units.iter().chain(&described) {
             let Some(&site) = self.numbers.get(place) else { continue };
             if self.told[site].is_empty() {
                 self.near.tell(site);
             }
             match self.told[site].iter_mut().find(|(l, _)| l == label) {
-                Some((_, known)) => known.add(*tally, 1.0),
-                None => self.told[site].push((*label, *tally)),
+                Some((_, known)) => known.add(*told, 1.0),
+                None => self.told[site].push((*label, *told)),
             }
         }
     }
 
+    /// Where what an utterance describes lies, given all before it.
+    fn described(&mut self, testimony: &Testimony) -> Vec<Units> {
+        let (own, mut units) = (self.talk.said(testimony), Vec::new());
+        for (p, label, said) in self.talk.described(testimony) {
+            let figure = self.figure(testimony.utterance, (said, label), &own);
+            let ratio = figure.ratio();
+            units.extend(figure.spots.iter().map(|&(place, weight)| {
+                let told = Told { described: p * weight / ratio, ..Told::default() };
+                Units { place, label, told }
+            }));
+        }
+        units
+    }
+
     /// p(λ | G, λ before) over that of a sentence that says nothing.
-    fn ratio(&mut self, testimony: &Testimony, units: &[Units]) -> f64 {
-        let own: Vec<(LabelId, f64)> = units.iter().map(|u| (u.label, u.tally.said)).collect();
+    fn ratio(&mut self, testimony: &Testimony) -> f64 {
+        let own = self.talk.said(testimony);
         let (mut ratio, mut rest) = (0.0, 1.0);
         for Claims { weight, claims } in &testimony.readings {
             let each = |&(certainty, claim): &(f64, Claim)| {
@@ -264,7 +220,7 @@ impl<'a> Fold<'a> {
             Claim::Visited { place, before } => self.visited(place, before),
             Claim::At { place, map_from_place, sigma } => self.at(place, &map_from_place, sigma),
             Claim::Located { said } => match self.talk.meant(utterance, said) {
-                Some(_) => unless_false(self.particle.labels.described(utterance, said)),
+                Some(label) => unless_false(self.figure(utterance, (said, label), own).ratio()),
                 None => 1.0,
             },
         }
@@ -279,34 +235,65 @@ impl<'a> Fold<'a> {
         own: &[(LabelId, f64)],
     ) -> f64 {
         let Some(label) = self.talk.meant(utterance, said) else { return 1.0 };
+        let Predicted { known, new } = self.predicted(place, label, own);
+        match again {
+            Sameness::Open => unless_false(known + new),
+            // "Back in the lobby": it was called so before.
+            Sameness::Same => unless_false(known + OF_ITS_KIND[usize::from(!self.base.is_way(label))] * new),
+            // "Another lobby": it was not.
+            Sameness::Other => {
+                let Told { tally, described } = self.joined.of[label as usize];
+                unless_false((1.0 - tally.applies()) * (1.0 - described.min(1.0)))
+            }
+        }
+    }
+
+    /// Where what is described may lie. "The gym" is mostly the one that was spoken of before.
+    fn figure(
+        &mut self,
+        utterance: u32,
+        (said, label): (LabelId, LabelId),
+        own: &[(LabelId, f64)],
+    ) -> Figure {
+        let is_known = self.mentioned.contains(&label) && !self.talk.ledger.is_common(label);
+        let another = if is_known { OF_ITS_KIND[1] } else { 1.0 };
+        let spots = self.particle.labels.described(utterance, said);
+        let unseen = another * (1.0 - spots.iter().map(|spot| spot.share).sum::<f64>());
+        let weight = |spot: &Spot| {
+            let Predicted { known, new } = self.predicted(spot.place, label, own);
+            (spot.place, spot.share * (known + another * new))
+        };
+        Figure { spots: spots.iter().map(weight).collect(), unseen }
+    }
+
+    /// p(l | what was said near a place) / p₀(l), eq. (12), summed over what of all that is described is there: at most
+    /// one, for where a description leaves a hallway's rooms open it takes none of them from others.
+    fn predicted(&mut self, place: Vertex, label: LabelId, own: &[(LabelId, f64)]) -> Predicted {
         self.join(place);
         let (base, joined) = (&self.base, &self.joined);
         let p0 = |l: LabelId| base.probability(l, own);
-        let tally = joined.of[label as usize];
-        let is_way = base.is_way(label);
-        let total = joined.total(|l| base.is_way(l) == is_way, p0);
-        match again {
-            Sameness::Open => {
-                let predicted = tally.concentration() + BASE * p0(label) * tally.left();
-                unless_false(predicted / total / p0(label))
-            }
-            // "Back in the lobby": it was called so before.
-            Sameness::Same => {
-                let called_so = tally.concentration() / total / p0(label);
-                let open = called_so + BASE * tally.left() / total;
-                let kind = OF_ITS_KIND[usize::from(!is_way)];
-                unless_false(kind * open + (1.0 - kind) * called_so)
-            }
-            // "Another lobby": it was not.
-            Sameness::Other => unless_false(1.0 - tally.applies()),
-        }
+        let (tally, is_way) = (joined.of[label as usize].tally, base.is_way(label));
+        let of_class = |l: LabelId| base.is_way(l) == is_way;
+        let total = joined.total(of_class, p0);
+        let described = |l: &&LabelId| of_class(**l) && joined.of[**l as usize].described > 0.0;
+        let [itself, other] = joined.names.iter().filter(described).fold([0.0; 2], |mut sums, &l| {
+            sums[usize::from(l != label)] += joined.of[l as usize].described;
+            sums
+        });
+        let scale = 1.0 / (itself + other).max(1.0);
+        let [itself, other] = [itself * scale, other * scale];
+        // As it is without any of them, and with one.
+        let [bare, one] = [(1.0 - itself - other) / total, 1.0 / (total + 1.0)];
+        let told = tally.concentration() * (bare + (itself + other) * one) + itself * one;
+        let new = BASE * tally.left() * (bare + (itself + other) * one);
+        Predicted { known: told / p0(label), new }
     }
 
     /// "This is not the gym".
     fn denied(&mut self, utterance: u32, (place, said): (Vertex, LabelId)) -> f64 {
         let Some(label) = self.talk.meant(utterance, said) else { return 1.0 };
         self.join(place);
-        unless_false(1.0 - self.joined.of[label as usize].applies())
+        unless_false(1.0 - self.joined.of[label as usize].tally.applies())
     }
 
     /// Gathers what was said of a place and those near.
@@ -315,7 +302,7 @@ impl<'a> Fold<'a> {
         joined.clear();
         if let Some(&site) = numbers.get(&place) {
             near.joined(site, |k, share| {
-                told[k].iter().for_each(|&(label, tally)| joined.add(label, tally, share));
+                told[k].iter().for_each(|&(label, told)| joined.add(label, told, share));
             });
         }
     }

@@ -63,6 +63,8 @@ pub struct Ledger {
     /// Of the first names, whether they are those of ways: known again once the next is entered.
     #[serde(skip)]
     ways: Vec<bool>,
+    /// Of each name, whether many rooms bear it.
+    common: Vec<bool>,
     by_name: BTreeMap<String, LabelId>,
     /// Names that mean another one, with the utterance that says so; none: the operator does.
     aliases: BTreeMap<LabelId, (LabelId, Option<u32>)>,
@@ -118,6 +120,11 @@ impl Ledger {
     pub fn is_way(&self, label: LabelId) -> bool {
         let name_is_way = || Name::new(self.name(label)).is_some_and(|name| name.is_way());
         self.ways.get(label as usize).copied().unwrap_or_else(name_is_way)
+    }
+
+    /// Whether several rooms of a building bear a name more often than not.
+    pub fn is_common(&self, label: LabelId) -> bool {
+        self.common.get(label as usize) == Some(&true)
     }
 
     /// All names in the order first said.
@@ -195,6 +202,7 @@ impl Ledger {
         let ways = (self.ways.len()..self.names.len()).map(|label| self.is_way(label as LabelId));
         let ways: Vec<bool> = ways.collect();
         self.ways.extend(ways);
+        self.common.push(name.is_common());
         id
     }
 

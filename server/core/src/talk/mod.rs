@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! sentence ─ listen ─▶ language ─▶ take_in ─▶ ledger, claims, labels
-//!                                  describe ─▶ labels: grounded when said, and again as the map grows
+//!                         locate ─▶ describe ─▶ labels: grounded when said, and again as the map grows
 //!            └ doubts ─▶ questions ─▶ "yes": taken in
 //! "no, …", undo ─ mend ─▶ the same taken back
 //! where the robot is, pointed out ─ told ─▶ ledger, claims
@@ -18,6 +18,7 @@ mod doubts;
 mod fold;
 pub mod ledger;
 mod listen;
+pub(crate) mod locate;
 mod mend;
 pub mod questions;
 mod replied;

@@ -29,10 +29,11 @@ function sentenceItem(s, answered) {
       buttons.push(element("button", { type: "button", onclick: reply }, answer));
     }
   }
-  if (s.state === "understood" && !s.undone) {
+  if (s.state === "understood" && !s.asks && !s.undone) {
     buttons.push(element("button", { type: "button", onclick: () => undo(s) }, "Not that"));
   }
-  const state = s.undone ? "taken back" : s.late ? `${STATES[s.state]}: ${s.late}` : STATES[s.state] ?? s.state;
+  const known = s.asks && s.state === "understood" ? "answered" : STATES[s.state] ?? s.state;
+  const state = s.undone ? "taken back" : s.late ? `${known}: ${s.late}` : known;
   const time = new Date(s.saidAt).toLocaleTimeString([], { hour: "2-digit", minute: "2-digit" });
   return element("li", { class: s.undone ? "undone" : s.state },
     element("p", { class: "said" }, s.sentence.text),

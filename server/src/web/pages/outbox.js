@@ -11,6 +11,9 @@ const DONE_MAX = 50;
 const WRONG = [400, 413, 415, 422];
 const NOT_YET = ["busy", "internal", "robot_ambiguous", "no_such_robot"];
 
+/** Whether a reading (PROTOCOL.md) tells the map nothing. */
+const onlyAsks = (reading) => Boolean(reading) && reading.split("&").every((act) => /^(ask\(|none)/.test(act));
+
 export class Outbox {
   /** `changed` is called with all sentences, the newest last; `warn` with what keeps them from being kept. */
   constructor(changed, warn) {
@@ -100,6 +103,7 @@ export class Outbox {
       s.state = heard.status;
       s.words = heard.question ?? (heard.words || heard.error?.message || "");
       s.durable = s.durable || heard.durable;
+      s.asks = onlyAsks(heard.parse);
       s.late = undefined;
       s.done = heard.status !== "read";
     });

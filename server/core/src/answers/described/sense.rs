@@ -7,8 +7,8 @@ use crate::geometry::Pose2;
 use crate::language::act::{Analysis, Head, Locate, Modifiers, Phrase, Restriction};
 use crate::language::{Frame, Name, Relation};
 use crate::regions::{Rooms, Shape};
-use crate::talk::describe::{located_by, narrowing};
 use crate::talk::ledger::{Entry, Ledger};
+use crate::talk::locate::{located_by, narrowing};
 
 /// Landmarks looked at, the likeliest.
 const LANDMARKS_MAX: usize = 4;

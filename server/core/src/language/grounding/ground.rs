@@ -22,19 +22,9 @@ pub struct Grounding {
     pub p: Vec<f64>,
     /// Probability that the figure is not in the map yet.
     pub p_elsewhere: f64,
-    /// p(clause) by what is known of the figure, over that of a clause that says nothing: above 1 where
-    /// what is called so lies as described, below where it does not, 1 where nobody knows.
-    pub likelihood_ratio: f64,
-    /// The same per place, were the figure known to be there.
-    pub ratios: Vec<f64>,
-}
-
-impl Grounding {
-    /// `likelihood_ratio` had something else been known of the figure.
-    pub fn likelihood_ratio_by(&self, figure_prior: &[f64]) -> f64 {
-        let (known, share) = taught(figure_prior, self.ratios.len());
-        known * share.iter().zip(&self.ratios).map(|(share, ratio)| share * ratio).sum::<f64>() + 1.0 - known
-    }
+    /// Per place: share of all floor where a thing may lie of which this is said, whatever it is called. What they
+    /// lack to one is floor not seen yet.
+    pub floor: Vec<f64>,
 }
 
 /// Landmark hypotheses summed over, per reading; the likeliest are kept.
@@ -89,12 +79,10 @@ pub fn ground_with(
     let (known, share) = taught(figure_prior, places.len());
     // (14), the sum over what the figure is: a place taught by that name, a place seen without being
     // named, or one not in the map yet.
-    let ratios: Vec<f64> =
-        density.iter().map(|f| (f * FLOOR_M2 + p_unknown).clamp(RATIO.0, RATIO.1)).collect();
+    let floor: Vec<f64> = density.iter().zip(&cells_m2).map(|(f, m2)| f * m2 * cap).collect();
+    let ratio = |f: f64| (f * FLOOR_M2 + p_unknown).clamp(RATIO.0, RATIO.1);
     let mut p: Vec<f64> = (0..places.len())
-        .map(|i| {
-            known * share[i] * ratios[i] + (1.0 - known) * (1.0 - NOT_YET) * density[i] * cells_m2[i] * cap
-        })
+        .map(|i| known * share[i] * ratio(density[i]) + (1.0 - known) * (1.0 - NOT_YET) * floor[i])
         .collect();
     let elsewhere = (1.0 - known) * (1.0 - (1.0 - NOT_YET) * (seen * cap));
     let z = p.iter().sum::<f64>() + elsewhere; // 1/Z of (16)
@@ -104,7 +92,7 @@ pub fn ground_with(
     for x in &mut p {
         *x /= z;
     }
-    Grounding { p, p_elsewhere: elsewhere / z, likelihood_ratio: z, ratios }
+    Grounding { p, p_elsewhere: elsewhere / z, floor }
 }
 
 /// Density of the figure of a clause at every place, per m²: (15) alone, its factors those of the path driven.
@@ -113,7 +101,7 @@ pub fn densities(readings: &[Reading], places: &[GroundPlace], speaker: usize) -
 }
 
 fn nothing_said(places: usize) -> Grounding {
-    Grounding { p: vec![0.0; places], p_elsewhere: 1.0, likelihood_ratio: 1.0, ratios: vec![1.0; places] }
+    Grounding { p: vec![0.0; places], p_elsewhere: 1.0, floor: vec![0.0; places] }
 }
 
 /// Σ over readings, frames and landmarks of their probability times f(figure, landmark), per m² at every

@@ -72,6 +72,36 @@ pub(crate) fn is_way(word: &str) -> bool {
     )
 }
 
+/// Names that several rooms of a building bear more often than not, as they are entered.
+pub const COMMON: [&str; 26] = [
+    "office",
+    "bathroom",
+    "elevator",
+    "elevator lobby",
+    "lobby",
+    "lounge",
+    "entrance",
+    "exit",
+    "door",
+    "stairwell",
+    "meeting room",
+    "conference room",
+    "classroom",
+    "lab",
+    "storage room",
+    "closet",
+    "copy room",
+    "printer",
+    "kitchenette",
+    "seating area",
+    "waiting area",
+    "bedroom",
+    "ward",
+    "room",
+    "stairway",
+    "desk",
+];
+
 /// Does this noun need a telling modifier ("mail area")?
 pub(crate) fn is_generic(word: &str) -> bool {
     listed(GENERIC, word)

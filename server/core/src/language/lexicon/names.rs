@@ -4,7 +4,7 @@ use crate::language::lexicon::concepts::Type;
 use crate::language::lexicon::normalise::{COMMA, name_words};
 use crate::language::lexicon::numbers::{is_number, numbers_as_spoken};
 use crate::language::lexicon::{
-    concept, hypernym, is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise,
+    COMMON, concept, hypernym, is_compound, is_disqualified, is_generic, is_not_a_place, is_place, is_praise,
     is_thing, is_way, is_weak, singular, unified,
 };
 use serde::{Deserialize, Serialize};
@@ -70,6 +70,11 @@ impl Name {
     pub fn is_way(&self) -> bool {
         let words: Vec<&str> = self.0.split(' ').collect();
         head(&words).is_some_and(|at| is_way(words[at]))
+    }
+
+    /// Whether several rooms of a building bear it more often than not.
+    pub fn is_common(&self) -> bool {
+        COMMON.contains(&self.0.as_str())
     }
 
     /// What speaks for it being a place's name.

@@ -273,7 +273,7 @@ fn nothing_known_says_nothing() {
     let g = ground(Relation::Down, &corridor(), 40, &[], &[0.5; 41]);
     assert!((g.p_elsewhere - 1.0).abs() < 1e-12);
     let g = ground(Relation::Down, &[], 0, &[(0, 1.0)], &[]);
-    assert_eq!(g, Grounding { p: vec![], p_elsewhere: 1.0, likelihood_ratio: 1.0, ratios: vec![] });
+    assert_eq!(g, Grounding { p: vec![], p_elsewhere: 1.0, floor: vec![] });
     assert_eq!(ground_clause(&[], &corridor(), 3, &[]).p, vec![0.0; 41]);
 }
 
