@@ -31,13 +31,11 @@ impl<S> Accept<TcpStream, S> for Bounded {
     type Future = Ready<io::Result<(Connection, S)>>;
 
     fn accept(&self, stream: TcpStream, service: S) -> Self::Future {
-        ready(match self.free.clone().try_acquire_owned() {
-            Ok(permit) => Ok((Connection { stream, _permit: permit }, service)),
-            Err(_) => {
-                self.board.reach("connections");
-                Err(io::Error::other("too many connections"))
-            }
-        })
+        let Ok(permit) = self.free.clone().try_acquire_owned() else {
+            self.board.reach("connections");
+            return ready(Err(io::Error::other("too many connections")));
+        };
+        ready(Ok((Connection { stream, _permit: permit }, service)))
     }
 }
 

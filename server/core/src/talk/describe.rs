@@ -263,7 +263,9 @@ impl Scene<'_> {
         // A room alone is meant wherever it is.
         if !is_near && left > 0.0 {
             let scale = told.min(1.0) / left;
-            p.iter_mut().for_each(|p| *p *= scale);
+            for p in p {
+                *p *= scale;
+            }
         }
     }
 
