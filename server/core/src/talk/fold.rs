@@ -100,6 +100,8 @@ struct Fold<'a> {
     /// What was said of each site so far.
     told: Vec<Vec<(LabelId, Told)>>,
     joined: Joined,
+    /// Of the sentence at hand, by name as said: reckoned once, to weigh it and to take it in.
+    figures: BTreeMap<LabelId, Figure>,
     /// Names that were spoken of so far, and where.
     mentioned: BTreeSet<LabelId>,
     spoken_at: BTreeSet<Vertex>,
@@ -143,6 +145,7 @@ impl<'a> Fold<'a> {
             near: Near::new(sites),
             told,
             joined: Joined::of(names),
+            figures: BTreeMap::new(),
             mentioned: BTreeSet::new(),
             spoken_at: BTreeSet::new(),
         }
@@ -150,6 +153,7 @@ impl<'a> Fold<'a> {
 
     fn hear(&mut self, testimony: &Testimony, units: &[Units]) {
         let described = self.described(testimony);
+        self.figures.clear();
         self.mentioned.extend(self.talk.names(testimony));
         if testimony.is_pose() {
             return;
@@ -250,6 +254,17 @@ impl<'a> Fold<'a> {
 
     /// Where what is described may lie. "The gym" is mostly the one that was spoken of before.
     fn figure(
+        &mut self,
+        utterance: u32,
+        (said, label): (LabelId, LabelId),
+        own: &[(LabelId, f64)],
+    ) -> &Figure {
+        let known = self.figures.remove(&said);
+        let figure = known.unwrap_or_else(|| self.figure_anew(utterance, (said, label), own));
+        self.figures.entry(said).or_insert(figure)
+    }
+
+    fn figure_anew(
         &mut self,
         utterance: u32,
         (said, label): (LabelId, LabelId),
