@@ -54,7 +54,7 @@ pub enum Claim {
         /// Standard deviations: metres in each direction, radians.
         sigma: [f64; 2],
     },
-    /// "The gym is down the hall": how well that fits is the particle's own, see
+    /// "The gym is down the hall": where that puts it is the particle's own, see
     /// [`Labels::described`](crate::filter::labels::Labels::described).
     Located {
         /// The figure's name as said.

@@ -10,6 +10,9 @@
 //! log p(λ_n | G, λ_<n) − log p₀ = log( Σ_r w_r Π_c (q_c ratio_c + 1 − q_c) + 1 − Σ_r w_r )
 //! ratio(described l)            = (1 − ε) (Σ_i s_i p(l | λ_<n at i) / p₀(l) + 1 − Σ_i s_i) + ε
 //! ```
+//!
+//! Where l was spoken of before and is no name that many rooms bear, what is new in it, and floor not seen, counts
+//! [`OF_ITS_KIND`]: "the gym" is mostly that one.
 
 mod said;
 
