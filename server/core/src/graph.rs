@@ -8,6 +8,7 @@ use self::stretches::Stretches;
 use crate::edge::{PlaceId, Vertex};
 use crate::event::StampNs;
 use crate::geometry::Pose2;
+use crate::scan::enclosure::Enclosure;
 use crate::scan::matching::Mode;
 use crate::scan::place::Content;
 use crate::track::places::{Chain, FrozenPlace};
@@ -33,6 +34,8 @@ pub struct Place {
     pub chain: Chain,
     /// What it looks like.
     pub content: Content,
+    /// How far its room reaches.
+    pub enclosure: Enclosure,
 }
 
 /// What matching a pair of places found.
@@ -67,6 +70,7 @@ impl Graph {
             front_from_place: frozen.open.front_from_place,
             segment,
             chain: frozen.open.chain,
+            enclosure: Enclosure::of(&frozen.content),
             content: frozen.content,
         }));
         (self.places.len() - 1) as Vertex

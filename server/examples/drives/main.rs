@@ -8,6 +8,7 @@
 //! cargo run --release -p toponym-server --example drives -- absence --seeds 20
 //! cargo run --release -p toponym-server --example drives -- faults --seeds 200 --plans PLANS
 //! cargo run --release -p toponym-server --example drives -- rooms --seeds 20 --plans PLANS
+//! cargo run --release -p toponym-server --example drives -- enclosed --seeds 60 --plans PLANS
 //! cargo run --release -p toponym-server --example drives -- described --seeds 200 --plans PLANS --out weights.rs
 //! ```
 //! `chance` learns how much likelier a true fit is than one by chance (`LOOKS` in the core's `chance.rs`), and
@@ -26,6 +27,7 @@ mod coverage;
 mod dark;
 mod described;
 mod drive;
+mod enclosed;
 mod faults;
 mod logistic;
 mod rooms;
@@ -93,6 +95,18 @@ enum What {
         #[arg(long, default_value_t = 20)]
         seeds: u64,
     },
+    /// Of how near places, with what is seen between them, how many are of one room; and what shape is a way's.
+    Enclosed {
+        /// Folder with floor plans (XML of the KTH campus data set); none: random offices.
+        #[arg(long)]
+        plans: Option<PathBuf>,
+        /// The first seed.
+        #[arg(long, default_value_t = 1)]
+        from: u64,
+        /// How many.
+        #[arg(long, default_value_t = 60)]
+        seeds: u64,
+    },
     /// Which room is meant by "next to the kitchen": learns the weights and shows what they are worth elsewhere.
     Described {
         /// Folder with floor plans (XML of the KTH campus data set).
@@ -132,6 +146,7 @@ fn main() {
             faults::report(plans.as_deref(), from..from + seeds, only.as_deref(), clean);
         }
         What::Rooms { plans, from, seeds } => rooms::report(plans.as_deref(), from..from + seeds),
+        What::Enclosed { plans, from, seeds } => enclosed::report(plans.as_deref(), from..from + seeds),
         What::Described { plans, from, seeds, out } => {
             described::report(&plans, from..from + seeds, out.as_deref());
         }

@@ -3,20 +3,20 @@
 
 use crate::faults::{Row, alignment, buildings};
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toponym_core::effects::Effect;
 use toponym_core::regions::Region;
 use toponym_core::{Config, Event, Mapper, Pose2};
 use toponym_proto::Message;
 use toponym_server::convert::event;
-use toponym_sim::{Draw, FloorPlan, LaserModel, OfficeStyle, Recording, Scenario};
+use toponym_sim::{Draw, FloorPlan, LaserModel, OfficeStyle, Recording, Room, Scenario};
 
 /// Between the points at which areas are counted.
 const STEP_M: f64 = 0.1;
 /// What the draws of a drive are for, among the simulator's.
 const ROOMS: u64 = 6000;
 
-type Polygon = Vec<(f64, f64)>;
+pub type Polygon = Vec<(f64, f64)>;
 /// A room and a region that share some floor.
 type Overlap = (Option<usize>, Option<usize>);
 
@@ -37,24 +37,9 @@ pub fn report(plans: Option<&Path>, seeds: std::ops::Range<u64>) {
     let plans = plans.map(buildings).unwrap_or_default();
     let mut all = Vec::new();
     for seed in seeds {
-        let mut draw = Draw::new(seed, ROOMS);
-        let stops = 6 + draw.below(10);
-        let plan = (!plans.is_empty()).then(|| &plans[draw.below(plans.len())]);
-        let toured = plan.and_then(|p| Scenario::floor_plan(&FloorPlan::read(p).ok()?, stops, seed).ok());
-        let name =
-            plan.filter(|_| toured.is_some()).and_then(|p| p.file_stem()?.to_str()).unwrap_or("office");
-        let mut scenario = toured.unwrap_or_else(|| Scenario::office(&OfficeStyle::default(), stops, seed));
-        if draw.chance(0.5) {
-            scenario.lasers = vec![LaserModel::rplidar()];
-        }
-        scenario.people = draw.below(3);
+        let (name, scenario) = drawn(&plans, seed);
         let Ok(recording) = scenario.run() else { continue };
-        let rooms: Vec<Polygon> = scenario
-            .world
-            .rooms
-            .iter()
-            .map(|r| r.area.corners.iter().map(|p| (p[0], p[1])).collect())
-            .collect();
+        let rooms = rooms(&scenario);
         let Some(score) = played(&recording, &rooms) else { continue };
         println!(
             "{seed} {name}: {} rooms, {} regions, IoU {:.3} and {:.3}, precision {:.3}, recall {:.3}, ARI {:.3}",
@@ -78,6 +63,27 @@ pub fn report(plans: Option<&Path>, seeds: std::ops::Range<u64>) {
         mean(|s| s.recall),
         mean(|s| s.rand)
     );
+}
+
+/// A tour of one of these buildings, or of a random office, and its name.
+pub fn drawn(plans: &[PathBuf], seed: u64) -> (&str, Scenario) {
+    let mut draw = Draw::new(seed, ROOMS);
+    let stops = 6 + draw.below(10);
+    let plan = (!plans.is_empty()).then(|| &plans[draw.below(plans.len())]);
+    let toured = plan.and_then(|p| Scenario::floor_plan(&FloorPlan::read(p).ok()?, stops, seed).ok());
+    let name = plan.filter(|_| toured.is_some()).and_then(|p| p.file_stem()?.to_str()).unwrap_or("office");
+    let mut scenario = toured.unwrap_or_else(|| Scenario::office(&OfficeStyle::default(), stops, seed));
+    if draw.chance(0.5) {
+        scenario.lasers = vec![LaserModel::rplidar()];
+    }
+    scenario.people = draw.below(3);
+    (name, scenario)
+}
+
+/// Outlines of its rooms.
+pub fn rooms(scenario: &Scenario) -> Vec<Polygon> {
+    let outline = |r: &Room| r.area.corners.iter().map(|p| (p[0], p[1])).collect();
+    scenario.world.rooms.iter().map(outline).collect()
 }
 
 fn played(recording: &Recording, rooms: &[Polygon]) -> Option<Score> {
@@ -178,7 +184,7 @@ fn rand(shared: &BTreeMap<Overlap, f64>) -> f64 {
 }
 
 /// Whether a point is inside: crossings of a ray along x.
-fn contains(line: &[(f64, f64)], x: f64, y: f64) -> bool {
+pub fn contains(line: &[(f64, f64)], x: f64, y: f64) -> bool {
     let pairs = (0..line.len()).map(|k| (line[k], line[(k + 1) % line.len()]));
     let crosses = |(a, b): &((f64, f64), (f64, f64))| {
         (a.1 > y) != (b.1 > y) && x < a.0 + (y - a.1) / (b.1 - a.1) * (b.0 - a.0)

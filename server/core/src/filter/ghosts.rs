@@ -99,9 +99,9 @@ impl Ghosts {
         Some(self.ghosts.remove(at))
     }
 
-    /// All that are still remembered, whose odds may be told anew.
-    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut Ghost> {
-        self.ghosts.iter_mut()
+    /// Tells odds anew, and keeps those for which that answers yes.
+    pub fn retain(&mut self, tell: impl FnMut(&mut Ghost) -> bool) {
+        self.ghosts.retain_mut(tell);
     }
 
     /// Forgets what became impossible.

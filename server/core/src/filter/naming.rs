@@ -15,6 +15,7 @@
 
 use crate::geometry::Pose2;
 use crate::language::COMMON;
+use crate::scan::enclosure::{Enclosure, of_one_room};
 use std::collections::BTreeMap;
 
 /// Index of a name in the ledger.
@@ -60,15 +61,19 @@ pub fn share(distance_m: f64) -> f64 {
 }
 
 fn share_of_square(distance_m2: f64) -> f64 {
-    (distance_m2 * (-0.5 / (JOINED_M * JOINED_M))).exp()
+    (distance_m2 * (-0.5 / JOINED_M.powi(2))).exp()
 }
 
+/// The same of places that see each other with no door between, and share of those near that are of one room
+/// though they do not: by `--example drives -- enclosed` of the server.
+const IN_SIGHT_M: f64 = 12.0;
+const THROUGH_WALLS: f64 = 0.05;
 /// Beyond, [`share`] is less than 4·10⁻⁶.
 pub const REACH_M: f64 = 5.0 * JOINED_M;
 
 /// A place that something is said of, in one particle's map.
 #[derive(Clone, Copy, Debug)]
-pub struct Site {
+pub struct Site<'a> {
     /// Where it lies.
     pub pose: Pose2,
     /// Its floor: what nothing ties is no one room, else a fit would tie it.
@@ -77,10 +82,12 @@ pub struct Site {
     pub dark: bool,
     /// What vague stretches of path add up to before it, variance, m².
     pub drift_m2: f64,
+    /// How far its room reaches, of a place that is in the graph by now.
+    pub enclosure: Option<&'a Enclosure>,
 }
 
 /// Share of what is said of one place that holds for another, over where they may lie.
-pub fn share_between(a: &Site, b: &Site) -> f64 {
+pub fn share_between(a: &Site<'_>, b: &Site<'_>) -> f64 {
     let distance_m2 = (b.pose.x_m - a.pose.x_m).powi(2) + (b.pose.y_m - a.pose.y_m).powi(2);
     if a.dark && b.dark {
         let within =
@@ -92,29 +99,34 @@ pub fn share_between(a: &Site, b: &Site) -> f64 {
             ONE_YARD + (1.0 - ONE_YARD) * within(DARK_M.powi(2) + drift_m2)
         }
     } else if a.floor == b.floor {
-        share_of_square(distance_m2)
+        let near = share_of_square(distance_m2);
+        let one = of_one_room(a.enclosure, b.enclosure, &a.pose.between(&b.pose));
+        one.map_or(near, |one| {
+            let in_sight = (distance_m2 * (-0.5 / IN_SIGHT_M.powi(2))).exp();
+            one * in_sight + (1.0 - one) * THROUGH_WALLS * near
+        })
     } else {
         0.0
     }
 }
 
 /// Places in one particle's map: what is said of one holds for what lies near, by [`share_between`].
-pub struct Near {
-    sites: Vec<Site>,
+pub struct Near<'a> {
+    sites: Vec<Site<'a>>,
     /// Sites with anything said of them, by square of [`REACH_M`].
     cells: BTreeMap<(i64, i64), Vec<u32>>,
     /// Such as lie in the dark.
     dark: Vec<u32>,
 }
 
-impl Near {
+impl<'a> Near<'a> {
     /// None of them has anything said of it yet.
-    pub fn new(sites: Vec<Site>) -> Self {
+    pub fn new(sites: Vec<Site<'a>>) -> Self {
         Self { sites, cells: BTreeMap::new(), dark: Vec::new() }
     }
 
     /// One of them.
-    pub fn site(&self, site: usize) -> &Site {
+    pub fn site(&self, site: usize) -> &Site<'a> {
         &self.sites[site]
     }
 
@@ -132,7 +144,7 @@ fn cell(pose: &Pose2) -> (i64, i64) {
     ((pose.x_m / REACH_M).floor() as i64, (pose.y_m / REACH_M).floor() as i64)
 }
 
-impl Support for Near {
+impl Support for Near<'_> {
     fn joined(&self, here: usize, mut each: impl FnMut(usize, f64)) {
         let at = &self.sites[here];
         let (x, y) = cell(&at.pose);

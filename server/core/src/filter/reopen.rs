@@ -33,15 +33,19 @@ impl Filter {
         effects
     }
 
-    /// The odds of answers that the best map refuses, as it is by now.
+    /// The odds of answers that the best map refuses, as it is by now. What it says by itself by now is no other
+    /// graph: that it was dropped from one that did not is no evidence for it.
     fn tell_anew(&mut self) {
         let Self { graph, structure, particles, ghosts, .. } = self;
         let best = &particles[0];
-        for ghost in ghosts.iter_mut().filter(|g| g.there && !best.holds(g.edge.question)) {
-            if let Some(judged) = judge(graph, structure, best, &ghost.edge) {
+        ghosts.retain(|ghost| {
+            if ghost.there && !best.holds(ghost.edge.question) {
+                let Some(judged) = judge(graph, structure, best, &ghost.edge) else { return true };
                 ghost.log_odds = judged.log_there + ghost.since;
+                return !judged.known;
             }
-        }
+            true
+        });
     }
 
     /// The best particle with the other answer. None if no graph comes of it, or the same.

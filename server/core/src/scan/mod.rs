@@ -6,6 +6,7 @@
 //! - `weak`: the direction of which a registration knows little, and noise that looks like knowledge.
 //! - [`correlate`]: prior-free search for all transforms under which two clouds overlap.
 //! - [`agree`]: do two places see each other's walls, or through them?
+//! - [`enclosure`]: how far the room of a place reaches.
 //! - `local`: the surfaces of the last metres of path, kept as scans come and go.
 //! - [`front`]: the front end, every scan against the recent ones.
 //! - `wheels`: online calibration of odometry, and what its increments are worth.
@@ -16,6 +17,7 @@ pub mod agree;
 pub mod align;
 pub mod cloud;
 pub mod correlate;
+pub mod enclosure;
 pub mod matching;
 pub mod place;
 pub mod sweep;

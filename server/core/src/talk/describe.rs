@@ -8,6 +8,7 @@ use crate::filter::labels::{Evidence, LabelId, Labels, Source, Spot};
 use crate::filter::particle::Particle;
 use crate::filter::second_look::gained;
 use crate::geometry::Pose2;
+use crate::graph::Graph;
 use crate::language::act::{Head, Locate, Parse, Phrase, Restriction};
 use crate::language::{GroundPlace, Grounding, LandmarkBelief, Reading, ground_by_paper, ground_clause};
 use crate::talk::ledger::Ledger;
@@ -20,6 +21,8 @@ use std::sync::Arc;
 /// Squares of floor that a description is weighed by, and the likeliest that are.
 const SPOT_M: f64 = 2.0;
 const SPOTS_MAX: usize = 32;
+/// Of what is shaped like a hallway or like a room so much is none of the other kind for certain.
+const SHAPED: f64 = 0.95;
 /// A landmark that is less probable tells nothing of where the figure is.
 const MEANT_MIN: f64 = 0.1;
 /// Groundings less probable are not kept.
@@ -51,12 +54,14 @@ pub(crate) fn ground(
         ledger.enter_name(name);
     }
     let (ledger, by_paper) = (&talk.ledger, filter.config.rules.by_paper());
-    let vague = filter.graph.stretches.vague();
+    let graph = &filter.graph;
+    let vague = graph.stretches.vague();
     let ground = |p: &mut Particle| {
         let floors = Floors::of(&vague, p);
         let scene = Scene {
             places: places(&poses(p), path_m),
             floors: &floors,
+            graph,
             labels: &p.labels,
             ledger,
             utterance,
@@ -128,6 +133,7 @@ fn places(poses: &[Pose2], path_m: &[f64]) -> Vec<GroundPlace> {
 struct Scene<'a> {
     places: Vec<GroundPlace>,
     floors: &'a Floors,
+    graph: &'a Graph,
     labels: &'a Labels,
     ledger: &'a Ledger,
     utterance: u32,
@@ -152,7 +158,7 @@ impl Scene<'_> {
             let label = self.ledger.meant(said);
             let certainty = readings.iter().map(|r| r.0).sum::<f64>().min(1.0);
             let grounding = self.place_of(&readings, label);
-            described.push((said, self.spots(&readings, &grounding.floor)));
+            described.push((said, self.spots(&readings, &grounding.floor, self.ledger.is_way(label))));
             let p = grounding.p;
             grounded.extend(p.iter().enumerate().filter(|(_, p)| *p * certainty >= GROUNDED_MIN).map(
                 |(v, p)| {
@@ -164,12 +170,13 @@ impl Scene<'_> {
         (grounded, described)
     }
 
-    /// The likeliest floor, in squares of [`SPOT_M`], each by its likeliest place. Where a map lays floors one over the
-    /// other that nothing ties, only those count that the speaker or a landmark is on.
-    fn spots(&self, readings: &[(f64, Locate)], shares: &[f64]) -> Vec<Spot> {
+    /// The likeliest floor, in squares of [`SPOT_M`], each by its likeliest place; a room is no floor of a hallway. Where
+    /// a map lays floors one over the other that nothing ties, only those count that the speaker or a landmark is on.
+    fn spots(&self, readings: &[(f64, Locate)], shares: &[f64], is_way: bool) -> Vec<Spot> {
         let landmarks = readings.iter().flat_map(|(_, l)| &l.landmarks).flat_map(|l| self.landmark(l));
         let meant = landmarks.filter(|(_, p)| *p > MEANT_MIN).map(|(v, _)| self.floor(v));
         let floors: BTreeSet<usize> = meant.chain([self.floor(self.held)]).collect();
+        let mut left_out = 0.0;
         let mut squares: BTreeMap<(usize, i64, i64), (f64, Spot)> = BTreeMap::new();
         for (v, &share) in shares.iter().enumerate().filter(|(_, share)| **share > 0.0) {
             let (at, place, floor) = (&self.places[v], v as Vertex, self.floor(v));
@@ -178,6 +185,9 @@ impl Scene<'_> {
             }
             let square = |m: f64| (m / SPOT_M).floor() as i64;
             let key = (floor, square(at.x_m), square(at.y_m));
+            let of_its_kind = share * self.of_kind(v, is_way);
+            left_out += share - of_its_kind;
+            let share = of_its_kind;
             let (most, spot) = squares.entry(key).or_insert((0.0, Spot { place, share: 0.0 }));
             spot.share += share;
             if share > *most {
@@ -187,7 +197,16 @@ impl Scene<'_> {
         let mut spots: Vec<Spot> = squares.into_values().map(|(_, spot)| spot).collect();
         spots.sort_by(|a, b| b.share.total_cmp(&a.share).then(a.place.cmp(&b.place)));
         spots.truncate(SPOTS_MAX);
+        for spot in &mut spots {
+            spot.share /= 1.0 - left_out;
+        }
         spots
+    }
+
+    /// How likely the floor of a place is a way's or no way's, by its shape.
+    fn of_kind(&self, place: usize, is_way: bool) -> f64 {
+        let way = self.graph.places().get(place).map_or(0.5, |place| place.enclosure.way());
+        1.0 - SHAPED * if is_way { 1.0 - way } else { way }
     }
 
     /// p(figure is place i | λ), eq. (14), given what is located as its readings say.

@@ -25,7 +25,7 @@ use crate::filter::naming::{
 };
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
-use crate::graph::stretches::Stretch;
+use crate::graph::Graph;
 use crate::language::act::Sameness;
 use crate::talk::Talk;
 use crate::talk::claims::{Claim, Claims, Testimony};
@@ -52,13 +52,13 @@ const SITE_M2: f64 = 5000.0;
 /// Two successive places are hardly farther apart.
 const SPACING_MAX_M: f64 = 2.0;
 
-/// log p(λ_1 … λ_n | G, X, L), relative to sentences that say nothing; `vague` stretches part the map.
-pub fn log_likelihood(talk: &Talk, vague: &[&Stretch], particle: &Particle) -> f64 {
+/// log p(λ_1 … λ_n | G, X, L), relative to sentences that say nothing; `graph` is what all particles share.
+pub fn log_likelihood(talk: &Talk, graph: &Graph, particle: &Particle) -> f64 {
     let standing = talk.standing();
     if standing.is_empty() {
         return 0.0;
     }
-    let mut fold = Fold::new(talk, Floors::of(vague, particle), particle, &standing);
+    let mut fold = Fold::new(talk, graph, particle, &standing);
     let (old, new) = standing.split_at(standing.len().saturating_sub(WEIGHED_MAX));
     for (t, units) in old {
         fold.hear(t, units);
@@ -94,12 +94,11 @@ impl Figure {
 /// What was said so far, over one particle's map.
 struct Fold<'a> {
     talk: &'a Talk,
-    floors: Floors,
-    particle: &'a Particle,
+    map: Map<'a>,
     base: BaseMeasure,
     /// Sites by place.
     numbers: BTreeMap<Vertex, usize>,
-    near: Near,
+    near: Near<'a>,
     /// What was said of each site so far.
     told: Vec<Vec<(LabelId, Told)>>,
     joined: Joined,
@@ -114,10 +113,11 @@ impl<'a> Fold<'a> {
     /// Nothing heard yet, but p₀ known of all that will be.
     fn new(
         talk: &'a Talk,
-        floors: Floors,
+        graph: &'a Graph,
         particle: &'a Particle,
         standing: &[(&Testimony, Vec<Units>)],
     ) -> Self {
+        let map = Map { talk, graph, floors: Floors::of(&graph.stretches.vague(), particle), particle };
         let names = talk.ledger.names().len();
         let kind = |label| (talk.ledger.is_way(label), talk.ledger.is_common(label));
         let mut base = BaseMeasure::new(&(0..names as LabelId).map(kind).collect::<Vec<_>>());
@@ -130,7 +130,7 @@ impl<'a> Fold<'a> {
                 particle.labels.described(testimony.utterance, said).iter().map(|spot| spot.place)
             });
             for place in units.iter().map(|u| u.place).chain(spots) {
-                if let Some(site) = site(talk, &floors, particle, place) {
+                if let Some(site) = map.site(place) {
                     numbers.entry(place).or_insert_with(|| {
                         sites.push(site);
                         sites.len() - 1
@@ -141,8 +141,7 @@ impl<'a> Fold<'a> {
         let told = vec![Vec::new(); sites.len()];
         Self {
             talk,
-            floors,
-            particle,
+            map,
             base,
             numbers,
             near: Near::new(sites),
@@ -211,7 +210,7 @@ impl<'a> Fold<'a> {
         if is_first || self.talk.names(testimony).all(|label| self.mentioned.contains(&label)) {
             return 1.0;
         }
-        let at = |v: Vertex| site(self.talk, &self.floors, self.particle, v);
+        let at = |v: Vertex| self.map.site(v);
         let Some(here) = at(held) else { return 1.0 };
         let before = self.spoken_at.iter().filter(|&&v| v + VISITED_BACK < held).filter_map(|&v| at(v));
         let near = before.filter(|s| s.floor == here.floor).map(|s| s.pose.distance_m(&here.pose));
@@ -247,10 +246,10 @@ impl<'a> Fold<'a> {
             Sameness::Open => unless_false(known + new),
             // "Back in the lobby": it was called so before.
             Sameness::Same => unless_false(known + OF_ITS_KIND[usize::from(!self.base.is_way(label))] * new),
-            // "Another lobby": it was not.
+            // "Another lobby": it was not, nor anything else.
             Sameness::Other => {
                 let Told { tally, described } = self.joined.of[label as usize];
-                unless_false((1.0 - tally.applies()) * (1.0 - described.min(1.0)))
+                unless_false(new * (1.0 - tally.applies()) * (1.0 - described.min(1.0)))
             }
         }
     }
@@ -275,7 +274,7 @@ impl<'a> Fold<'a> {
     ) -> Figure {
         let is_known = self.mentioned.contains(&label) && !self.talk.ledger.is_common(label);
         let another = if is_known { OF_ITS_KIND[1] } else { 1.0 };
-        let spots = self.particle.labels.described(utterance, said);
+        let spots = self.map.particle.labels.described(utterance, said);
         let unseen = another * (1.0 - spots.iter().map(|spot| spot.share).sum::<f64>());
         let weight = |spot: &Spot| {
             let Predicted { known, new } = self.predicted(spot.place, label, own);
@@ -327,7 +326,7 @@ impl<'a> Fold<'a> {
 
     /// "This is where we started": density of lying in one room, over that of any two places.
     fn one(&self, a: Vertex, b: Vertex, same: bool) -> f64 {
-        let at = |v| site(self.talk, &self.floors, self.particle, v);
+        let at = |v| self.map.site(v);
         let (Some(a), Some(b)) = (at(a), at(b)) else { return 1.0 };
         so(share_between(&a, &b), ONE_BY_CHANCE, same)
     }
@@ -335,8 +334,8 @@ impl<'a> Fold<'a> {
     /// "The robot is here": its density there, over that anywhere in the building. What nothing ties to where the map
     /// began may be anywhere.
     fn at(&self, place: Vertex, told: &Pose2, [sigma_m, sigma_rad]: [f64; 2]) -> f64 {
-        let site = site(self.talk, &self.floors, self.particle, place);
-        let Some(here) = site.filter(|site| site.floor == self.floors.floor(0)) else { return 1.0 };
+        let site = self.map.site(place);
+        let Some(here) = site.filter(|site| site.floor == self.map.floors.floor(0)) else { return 1.0 };
         let (off_m, turned_rad) = (told.distance_m(&here.pose), told.between(&here.pose).yaw_rad);
         let d2 = (off_m / sigma_m).powi(2) + (turned_rad / sigma_rad).powi(2);
         let peak = SITE_M2 / (TAU * sigma_m * sigma_m) * (TAU.sqrt() / sigma_rad);
@@ -345,20 +344,20 @@ impl<'a> Fold<'a> {
 
     /// "We have been here before".
     fn visited(&self, place: Vertex, before: bool) -> f64 {
-        let Some(here) = site(self.talk, &self.floors, self.particle, place) else { return 1.0 };
+        let Some(here) = self.map.site(place) else { return 1.0 };
         so(share(self.nearest_m(place, &here)), VISITED_BY_CHANCE, before)
     }
 
     /// How near the path came before on the same floor, up to some metres before the place. Far stretches are
     /// skipped: a path is no shorter than the straight line.
     fn nearest_m(&self, place: Vertex, here: &Site) -> f64 {
-        let (belief, ends) = (&self.particle.belief, &self.floors.ends);
+        let Map { particle: Particle { belief, .. }, floors, .. } = &self.map;
         let end = place.saturating_sub(VISITED_BACK).min(belief.len() as Vertex);
         let (mut v, mut nearest_m) = (0, f64::INFINITY);
         while v < end {
-            let part = self.floors.part(v);
-            if self.floors.floor(part) != here.floor {
-                v = ends.get(part).map_or(end, |&next| next);
+            let part = floors.part(v);
+            if floors.floor(part) != here.floor {
+                v = floors.ends.get(part).map_or(end, |&next| next);
                 continue;
             }
             let distance_m = belief.pose(v).distance_m(&here.pose);
@@ -369,12 +368,27 @@ impl<'a> Fold<'a> {
     }
 }
 
-/// A place in a particle's map.
-fn site(talk: &Talk, floors: &Floors, particle: &Particle, v: Vertex) -> Option<Site> {
-    let pose = talk.testimonies.pose(particle, v)?;
-    let part = talk.testimonies.part(particle, &floors.ends, v);
-    let drift_m2 = floors.drift_m2[part.min(floors.ends.len())];
-    Some(Site { pose, floor: floors.floor(part), dark: talk.testimonies.is_dark(v), drift_m2 })
+/// One particle's map.
+struct Map<'a> {
+    talk: &'a Talk,
+    graph: &'a Graph,
+    floors: Floors,
+    particle: &'a Particle,
+}
+
+impl<'a> Map<'a> {
+    /// A place in it.
+    fn site(&self, v: Vertex) -> Option<Site<'a>> {
+        let (told, floors) = (&self.talk.testimonies, &self.floors);
+        let part = told.part(self.particle, &floors.ends, v);
+        Some(Site {
+            pose: told.pose(self.particle, v)?,
+            floor: floors.floor(part),
+            dark: told.is_dark(v),
+            drift_m2: floors.drift_m2[part.min(floors.ends.len())],
+            enclosure: self.graph.places().get(v as usize).map(|place| &place.enclosure),
+        })
+    }
 }
 
 /// What a yes or no says where the truth is `is`, and is so `by_chance`.

@@ -67,7 +67,7 @@ pub struct Talk {
 
 impl Words for Talk {
     fn log_likelihood(&self, graph: &Graph, particle: &Particle) -> f64 {
-        fold::log_likelihood(self, &graph.stretches.vague(), particle)
+        fold::log_likelihood(self, graph, particle)
     }
 }
 

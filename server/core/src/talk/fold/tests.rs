@@ -73,10 +73,10 @@ fn third(x_m: f64, claim: Claim) -> f64 {
     let (gym, kitchen) = (talk.name(0), talk.name(1));
     talk.claim(&map, &[called(0, gym)]);
     talk.claim(&map, &[called(1, kitchen)]);
-    let before = log_likelihood(&talk, &[], &map);
+    let before = log_likelihood(&talk, &Graph::default(), &map);
     assert!(before.abs() < 1e-12, "new places are called anything");
     talk.claim(&map, &[claim]);
-    log_likelihood(&talk, &[], &map)
+    log_likelihood(&talk, &Graph::default(), &map)
 }
 
 fn gym(x_m: f64, again: Sameness) -> f64 {
@@ -134,7 +134,7 @@ fn been_here_before_speaks_for_the_maps_that_come_back() {
         x_m.extend((0..30).map(|k| back_m + f64::from(k)));
         let (mut talk, map) = (Talk::default(), map(&x_m));
         talk.claim(&map, &[Claim::Visited { place: 89, before }]);
-        log_likelihood(&talk, &[], &map)
+        log_likelihood(&talk, &Graph::default(), &map)
     };
     assert!(claims(10.0, true) > 1.0 && claims(10.0, false) < -2.0);
     assert!(claims(200.0, true) < -2.0 && claims(200.0, false) > 0.2);
@@ -148,12 +148,12 @@ fn who_comes_back_over_known_floor_introduces_less() {
         let (mut talk, map) = (Talk::default(), map(&x_m));
         let names = [0, 1, 2].map(|k| talk.name(k));
         talk.claim_from(&map, spoken, &[called(0, names[0])]);
-        let before = log_likelihood(&talk, &[], &map);
+        let before = log_likelihood(&talk, &Graph::default(), &map);
         // Said of a place that nobody spoke of, then again.
         talk.claim_from(&map, 89, &[called(89, names[1])]);
-        let once = log_likelihood(&talk, &[], &map);
+        let once = log_likelihood(&talk, &Graph::default(), &map);
         talk.claim_from(&map, 89, &[called(89, names[1])]);
-        (once - before, log_likelihood(&talk, &[], &map) - once)
+        (once - before, log_likelihood(&talk, &Graph::default(), &map) - once)
     };
     let (known, new, silent) = (after(10.0, 39), after(200.0, 39), after(10.0, 0));
     assert!((known.0 - new.0 - INTRODUCED_AGAIN.ln()).abs() < 0.05, "{known:?} {new:?}");
@@ -169,7 +169,8 @@ fn words_said_before_an_edge_count_for_it() {
     let gym = talk.name(0);
     talk.claim(&apart, &[called(0, gym)]);
     talk.claim(&apart, &[called(2, gym)]);
-    let gain = log_likelihood(&talk, &[], &closed) - log_likelihood(&talk, &[], &apart);
+    let gain =
+        log_likelihood(&talk, &Graph::default(), &closed) - log_likelihood(&talk, &Graph::default(), &apart);
     assert!(gain > 3.0, "{gain}");
 }
 
@@ -189,7 +190,8 @@ fn a_place_spoken_of_ahead_of_the_graph_lies_where_it_will() {
         let here = Here { held: Some(2), poses: &poses, path_m: vec![], part: vec![], dark: vec![] };
         talk.testimonies.add(Testimony { utterance, readings }, &early, &here);
     }
-    let (before, after) = (log_likelihood(&talk, &[], &early), log_likelihood(&talk, &[], &late));
+    let (before, after) =
+        (log_likelihood(&talk, &Graph::default(), &early), log_likelihood(&talk, &Graph::default(), &late));
     assert!(before > 3.0 && (before - after).abs() < 1e-9, "{before} {after}");
     // The same before there is any graph.
     let mut talk = Talk::default();
@@ -203,7 +205,7 @@ fn a_place_spoken_of_ahead_of_the_graph_lies_where_it_will() {
         talk.testimonies.add(Testimony { utterance, readings }, &none, &here);
     }
     for map in [&none, &map(&[0.0]), &late] {
-        assert!((log_likelihood(&talk, &[], map) - after).abs() < 1e-9);
+        assert!((log_likelihood(&talk, &Graph::default(), map) - after).abs() < 1e-9);
     }
 }
 
@@ -215,9 +217,9 @@ fn readings_are_summed_inside() {
         let gym = talk.name(0);
         talk.name(1);
         talk.claim(&map, &[called(0, gym)]);
-        let before = log_likelihood(&talk, &[], &map);
+        let before = log_likelihood(&talk, &Graph::default(), &map);
         talk.claim_by(&map, readings);
-        (log_likelihood(&talk, &[], &map) - before).exp()
+        (log_likelihood(&talk, &Graph::default(), &map) - before).exp()
     };
     let (is, not) = (called(2, 0), Claim::Denied { place: 2, said: 0 });
     let sure = of(vec![(1.0, vec![(1.0, is)])]);
@@ -233,13 +235,13 @@ fn what_is_taken_back_was_never_said_and_may_be_said_again() {
     let mut talk = Talk::default();
     let gym = talk.name(0);
     talk.claim(&map, &[called(0, gym)]);
-    let before = log_likelihood(&talk, &[], &map);
+    let before = log_likelihood(&talk, &Graph::default(), &map);
     let number = talk.claim(&map, &[called(2, gym)]);
-    let after = log_likelihood(&talk, &[], &map);
+    let after = log_likelihood(&talk, &Graph::default(), &map);
     Arc::make_mut(&mut talk.ledger).strike(number);
-    assert!((log_likelihood(&talk, &[], &map) - before).abs() < 1e-12 && after - before > 3.0);
+    assert!((log_likelihood(&talk, &Graph::default(), &map) - before).abs() < 1e-12 && after - before > 3.0);
     talk.claim(&map, &[called(2, gym)]);
-    assert!((log_likelihood(&talk, &[], &map) - after).abs() < 1e-12);
+    assert!((log_likelihood(&talk, &Graph::default(), &map) - after).abs() < 1e-12);
 }
 
 #[test]
@@ -249,11 +251,11 @@ fn another_name_counts_as_the_one_it_means_and_a_forgotten_one_not() {
     let (gym, arena) = (talk.name(0), talk.name(1));
     talk.claim(&map, &[called(0, gym)]);
     talk.claim(&map, &[called(2, arena)]);
-    assert!(log_likelihood(&talk, &[], &map) < 0.0);
+    assert!(log_likelihood(&talk, &Graph::default(), &map) < 0.0);
     Arc::make_mut(&mut talk.ledger).call(gym, arena, None);
-    assert!(log_likelihood(&talk, &[], &map) > 3.0);
+    assert!(log_likelihood(&talk, &Graph::default(), &map) > 3.0);
     Arc::make_mut(&mut talk.ledger).forget(gym);
-    assert!(log_likelihood(&talk, &[], &map).abs() < 1e-12);
+    assert!(log_likelihood(&talk, &Graph::default(), &map).abs() < 1e-12);
 }
 
 #[test]
@@ -266,10 +268,10 @@ fn a_description_weighs_by_what_is_called_how_where_it_puts_its_figure() {
             let name = talk.name(name);
             talk.claim(&map, &[called(place, name)]);
         }
-        let before = log_likelihood(&talk, &[], &map);
+        let before = log_likelihood(&talk, &Graph::default(), &map);
         let number = talk.claim(&map, &[Claim::Located { said: gym }]);
         map.labels.describe(number, gym, spots.to_vec());
-        (log_likelihood(&talk, &[], &map) - before).exp()
+        (log_likelihood(&talk, &Graph::default(), &map) - before).exp()
     };
     let at = |place, share| Spot { place, share };
     let nothing = [at(2, 1.0)];
@@ -288,10 +290,10 @@ fn a_description_weighs_by_what_is_called_how_where_it_puts_its_figure() {
         let gym = talk.name(0);
         let number = talk.claim(&map, &[Claim::Located { said: gym }]);
         map.labels.describe(number, gym, vec![at(1, 0.8)]);
-        let before = log_likelihood(&talk, &[], &map);
+        let before = log_likelihood(&talk, &Graph::default(), &map);
         let name = talk.name(name);
         talk.claim(&map, &[called(1, name)]);
-        (log_likelihood(&talk, &[], &map) - before).exp()
+        (log_likelihood(&talk, &Graph::default(), &map) - before).exp()
     };
     assert!(then(0) > 10.0 && then(1) < 0.5);
 }
@@ -304,9 +306,9 @@ fn what_may_be_anywhere_takes_no_place_from_others() {
         let (gym, office) = (talk.name(0), talk.name(1));
         let number = talk.claim(&map, &[Claim::Located { said: gym }]);
         map.labels.describe(number, gym, vec![Spot { place: 1, share }]);
-        let before = log_likelihood(&talk, &[], &map);
+        let before = log_likelihood(&talk, &Graph::default(), &map);
         talk.claim(&map, &[called(1, office)]);
-        (log_likelihood(&talk, &[], &map) - before).exp()
+        (log_likelihood(&talk, &Graph::default(), &map) - before).exp()
     };
     // One chance in ten that the gym is there: one in ten less for another name, and not most of it.
     assert!((also(0.1) - 1.0).abs() < 0.1, "{}", also(0.1));
@@ -327,7 +329,7 @@ proptest! {
             for &(group, name, second) in said {
                 talk.claim(&map, &[called(2 * group + u32::from(second), name)]);
             }
-            log_likelihood(&talk, &[], &map)
+            log_likelihood(&talk, &Graph::default(), &map)
         };
         // By groups, in whatever order these, and within each as said.
         let mut by_group = said.clone();
@@ -372,7 +374,7 @@ proptest! {
             for k in if turn { [1, 0] } else { [0, 1] } {
                 talk.claim(&map, &[claims[k]]);
             }
-            log_likelihood(&talk, &[], &map)
+            log_likelihood(&talk, &Graph::default(), &map)
         };
         prop_assert!((fold(false) - fold(true)).abs() < 0.02);
     }
@@ -389,10 +391,10 @@ proptest! {
         for &(place, name) in &said {
             talk.claim(&map, &[called(place, name)]);
         }
-        let before = log_likelihood(&talk, &[], &map);
+        let before = log_likelihood(&talk, &Graph::default(), &map);
         // What others call so is rarer by one's own: all weigh anew, but none by more than the bounds.
         talk.claim(&map, &[Claim::Called { place: 3, said: name, again }]);
-        let gain = log_likelihood(&talk, &[], &map) - before;
+        let gain = log_likelihood(&talk, &Graph::default(), &map) - before;
         prop_assert!(gain > FALSE_TALK.ln() - 1.0 - 0.05 * said.len() as f64 && gain < 5.5, "{gain}");
     }
 }
