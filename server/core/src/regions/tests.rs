@@ -10,6 +10,7 @@ use super::reach::drivable;
 use crate::event::{Laser, Scan};
 use crate::geometry::Pose2;
 use crate::graph::Place;
+use crate::scan::enclosure::Enclosure;
 use crate::scan::place::Content;
 use crate::scan::sweep::sweep;
 use crate::scan::view::View;
@@ -147,6 +148,7 @@ fn place(k: usize, wall_m: f64) -> Arc<Place> {
     };
     let seen = sweep(&scan, &laser, |_| Pose2::default());
     let view = View { place_from_laser: laser.body_from_laser, image: seen.image };
+    let content = Content { cloud: seen.points, views: vec![view], sample: vec![] };
     Arc::new(Place {
         id: k as u64,
         stamp_ns: 0,
@@ -160,7 +162,8 @@ fn place(k: usize, wall_m: f64) -> Arc<Place> {
             unseen: false,
             failed: 0.0,
         },
-        content: Content { cloud: seen.points, views: vec![view], sample: vec![] },
+        enclosure: Enclosure::of(&content),
+        content,
     })
 }
 

@@ -203,10 +203,10 @@ impl Scene<'_> {
         spots
     }
 
-    /// How likely the floor of a place is a way's or no way's, by its shape.
+    /// By its shape, how much likelier the floor of a place is a way's, or none, than floor that nobody has seen.
     fn of_kind(&self, place: usize, is_way: bool) -> f64 {
         let way = self.graph.places().get(place).map_or(0.5, |place| place.enclosure.way());
-        1.0 - SHAPED * if is_way { 1.0 - way } else { way }
+        (1.0 - SHAPED * if is_way { 1.0 - way } else { way }) / (1.0 - SHAPED * 0.5)
     }
 
     /// p(figure is place i | λ), eq. (14), given what is located as its readings say.

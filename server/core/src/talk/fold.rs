@@ -36,6 +36,8 @@ use std::f64::consts::TAU;
 const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
 /// "The hallway again" and "back in the lobby" mean another of the kind so often.
 const OF_ITS_KIND: [f64; 2] = [0.9, 0.3];
+/// Who speaks of what was told of says so, "again", the other times (Heim, 1991): assumed.
+const UNMARKED: f64 = 0.5;
 /// How often a place has been seen before when somebody speaks of it.
 const VISITED_BY_CHANCE: f64 = 0.3;
 /// Who comes back over floor that was talked about introduces so much less than on new floor: assumed, not learned.
@@ -243,7 +245,7 @@ impl<'a> Fold<'a> {
         let Some(label) = self.talk.meant(utterance, said) else { return 1.0 };
         let Predicted { known, new } = self.predicted(place, label, own);
         match again {
-            Sameness::Open => unless_false(known + new),
+            Sameness::Open => unless_false(UNMARKED * known + new),
             // "Back in the lobby": it was called so before.
             Sameness::Same => unless_false(known + OF_ITS_KIND[usize::from(!self.base.is_way(label))] * new),
             // "Another lobby": it was not, nor anything else.
@@ -278,7 +280,7 @@ impl<'a> Fold<'a> {
         let unseen = another * (1.0 - spots.iter().map(|spot| spot.share).sum::<f64>());
         let weight = |spot: &Spot| {
             let Predicted { known, new } = self.predicted(spot.place, label, own);
-            (spot.place, spot.share * (known + another * new))
+            (spot.place, spot.share * (UNMARKED * known + another * new))
         };
         Figure { spots: spots.iter().map(weight).collect(), unseen }
     }

@@ -348,15 +348,16 @@ proptest! {
         for &(place, said, so) in &said {
             talk.claim(&map, &[if so { called(place, said) } else { Claim::Denied { place, said } }]);
         }
-        let standing = talk.standing();
-        let mut fold = Fold::new(&talk, Floors::of(&[], &map), &map, &standing);
+        let (graph, standing) = (&Graph::default(), talk.standing());
+        let mut fold = Fold::new(&talk, graph, &map, &standing);
         for (testimony, units) in &standing {
             fold.hear(testimony, units);
         }
         let place = said[at % said.len()].0;
         let mut p = |said| {
-            let ratio = fold.called(u32::MAX, (place, said), Sameness::Open, &[]);
-            ratio * fold.base.probability(said, &[])
+            let open = fold.called(u32::MAX, (place, said), Sameness::Open, &[]);
+            let again = (1.0 - FALSE_TALK) * (1.0 - UNMARKED) * fold.predicted(place, said, &[]).known;
+            (open + again) * fold.base.probability(said, &[])
         };
         // Name 6 is one of 118 that nobody has said; common ones are as many as 124 of these.
         let sum = (0..6).map(&mut p).sum::<f64>() + 242.0 * p(6);
