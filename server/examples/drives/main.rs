@@ -16,6 +16,8 @@
 //! `coverage` shows how often the truth lies in the 95 % region of the front end's increments.
 //! `dark` plays the simulator's tours itself and shows what the chain is worth over dark stretches; `absence` learns
 //! by them how often places contradict each other in right maps and in wrong ones (`CONTRADICTED` in `absence.rs`).
+//! `enclosed` counts in how far what is seen from places tells of one room (`IN_SIGHT_M` and `THROUGH_WALLS` in
+//! `naming.rs`), and what their shape tells of ways (`WAY` in `enclosure.rs`).
 //!
 //! A drive is a folder with `sim.rec` and `truth.json`, as `toponym simulate` makes them. Any log will do:
 //! `toponym-server serve --record` makes the one, `trajectory` rows `[t, x, y, yaw]` are the other.

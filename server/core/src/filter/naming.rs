@@ -315,6 +315,8 @@ pub fn unless_false(ratio: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scan::place::Content;
+    use crate::scan::tests::seen;
 
     #[test]
     fn one_utterance_leaves_the_doubt_that_it_is_false_and_two_are_no_certainty() {
@@ -341,5 +343,34 @@ mod tests {
         }
         assert!(base.probability(2, &[]) > 0.5, "a hallway is called so");
         assert!(base.probability(4, &[]) > 2.0 * base.probability(1, &[]), "many rooms are offices");
+    }
+
+    /// Of a place within four walls, so far off.
+    fn walled(wall_m: f64) -> Enclosure {
+        let [near, far] = [-wall_m, wall_m];
+        let walls =
+            [[near, near, far, near], [far, near, far, far], [far, far, near, far], [near, far, near, near]];
+        let sweep = seen(&walls, &Pose2::default());
+        Enclosure::of(&Content::new(&[(Pose2::default(), &sweep)]))
+    }
+
+    #[test]
+    fn what_is_said_holds_as_far_as_its_room_reaches() {
+        let (hall, closet) = (walled(5.0), walled(1.5));
+        let site = |x_m: f64, enclosure| Site {
+            pose: Pose2::new(x_m, 0.0, 0.0),
+            floor: 0,
+            dark: false,
+            drift_m2: 0.0,
+            enclosure,
+        };
+        let share = |a, b| share_between(&site(0.0, a), &site(3.0, b));
+        assert!(share(Some(&hall), Some(&hall)) > 0.9, "no wall between");
+        assert!(share(Some(&closet), Some(&closet)) < 0.05, "a wall between");
+        let unknown = share(None, None);
+        assert!((unknown - super::share(3.0)).abs() < 1e-12, "nobody knows");
+        assert!(share(Some(&closet), None) < unknown && unknown < share(Some(&hall), None));
+        // Farther off, nothing holds that nobody sees.
+        assert!(share_between(&site(0.0, Some(&closet)), &site(9.0, Some(&closet))) < 1e-3);
     }
 }

@@ -1,4 +1,5 @@
 use super::*;
+use crate::edge::QuestionId;
 use crate::filter::words::Silence;
 use crate::scan::matching::Mode;
 use crate::scan::place::Content;
@@ -142,6 +143,25 @@ fn a_false_loop_forced_on_all_is_undone() {
     filter.reopen(&Silence);
     filter.keep_best();
     assert!((length_m(&filter) - 20.0).abs() < 1e-6 && filter.unresolved() < 0.02, "{}", filter.unresolved());
+}
+
+#[test]
+fn what_the_best_map_came_to_say_by_itself_is_no_other_graph() {
+    let mut filter = straight();
+    let question = QuestionId { boot: 9, n: 9 };
+    let edge = Edge::of(&fit(0, 12.0, EdgeKind::Distance), 20, question, 0.0);
+    // Dropped from a map that had the places elsewhere, and much was against that since.
+    let ghost = Ghost { edge, there: true, log_odds: -3.0, since: 8.0, log_words: 0.0 };
+    filter.ghosts.drop_answer(ghost.clone());
+    filter.reopen(&Silence);
+    assert_eq!(filter.particles.len(), 2, "another graph, of which nobody paid for where it had the places");
+    let mut filter = straight();
+    filter.impose(20, &fit(1, 11.0, EdgeKind::Relocalisation));
+    filter.ghosts = Ghosts::default();
+    filter.ghosts.drop_answer(ghost);
+    filter.reopen(&Silence);
+    let edges: Vec<usize> = filter.particles.iter().map(|p| p.edges.len()).collect();
+    assert!(edges == [1] && filter.unresolved() < 1e-3, "{edges:?} {}", filter.unresolved());
 }
 
 #[test]

@@ -80,7 +80,7 @@ pub fn of_one_room(a: Option<&Enclosure>, b: Option<&Enclosure>, a_from_b: &Pose
     let of_a = a.and_then(|a| a.holds(a_from_b.x_m, a_from_b.y_m));
     let of_b = b.and_then(|b| b.holds(b_from_a.x_m, b_from_a.y_m));
     match (of_a, of_b) {
-        (Some(a), Some(b)) => Some((a + b) / 2.0),
+        (Some(a), Some(b)) => Some(a.midpoint(b)),
         (one, other) => one.or(other),
     }
 }
@@ -153,7 +153,7 @@ fn elongation(reach_m: &[f64; RAYS]) -> f64 {
     let [area, x, y, xx, yy, xy] = sums;
     let (x, y) = (x / area, y / area);
     let (xx, yy, xy) = (xx / area - x * x, yy / area - y * y, xy / area - x * y);
-    let (mean, off) = ((xx + yy) / 2.0, ((xx - yy) / 2.0).hypot(xy));
+    let (mean, off) = (xx.midpoint(yy), ((xx - yy) / 2.0).hypot(xy));
     let ratio = ((mean + off) / (mean - off)).sqrt();
     if ratio.is_finite() { ratio } else { 1.0 }
 }

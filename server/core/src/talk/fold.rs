@@ -14,15 +14,14 @@
 //! Where l was spoken of before and is no name that many rooms bear, what is new in it, and floor not seen, counts
 //! [`OF_ITS_KIND`]: "the gym" is mostly that one.
 
+mod map;
 mod said;
 
+use self::map::{Map, VISITED_BACK};
 use self::said::{Joined, Told, Units};
 use crate::edge::Vertex;
-use crate::filter::floors::Floors;
 use crate::filter::labels::{LabelId, Spot};
-use crate::filter::naming::{
-    BASE, BaseMeasure, Near, REACH_M, Site, Support, share, share_between, unless_false,
-};
+use crate::filter::naming::{BASE, BaseMeasure, Near, Support, share, share_between, unless_false};
 use crate::filter::particle::Particle;
 use crate::geometry::Pose2;
 use crate::graph::Graph;
@@ -44,15 +43,11 @@ const VISITED_BY_CHANCE: f64 = 0.3;
 const INTRODUCED_AGAIN: f64 = 0.5;
 /// Talk is about floor so far around.
 const TALKED_ABOUT_M: f64 = 10.0;
-/// Places so far back along the path are no visit before.
-const VISITED_BACK: Vertex = 12;
 /// Sentences that are weighed anew in each map; what was said before them is taken as said, so that the time for one more
 /// is bounded.
 const WEIGHED_MAX: usize = 1000;
 /// Floor on which a robot may be, when somebody points out where it is: a building's.
 const SITE_M2: f64 = 5000.0;
-/// Two successive places are hardly farther apart.
-const SPACING_MAX_M: f64 = 2.0;
 
 /// log p(λ_1 … λ_n | G, X, L), relative to sentences that say nothing; `graph` is what all particles share.
 pub fn log_likelihood(talk: &Talk, graph: &Graph, particle: &Particle) -> f64 {
@@ -119,7 +114,7 @@ impl<'a> Fold<'a> {
         particle: &'a Particle,
         standing: &[(&Testimony, Vec<Units>)],
     ) -> Self {
-        let map = Map { talk, graph, floors: Floors::of(&graph.stretches.vague(), particle), particle };
+        let map = Map::new(talk, graph, particle);
         let names = talk.ledger.names().len();
         let kind = |label| (talk.ledger.is_way(label), talk.ledger.is_common(label));
         let mut base = BaseMeasure::new(&(0..names as LabelId).map(kind).collect::<Vec<_>>());
@@ -347,49 +342,7 @@ impl<'a> Fold<'a> {
     /// "We have been here before".
     fn visited(&self, place: Vertex, before: bool) -> f64 {
         let Some(here) = self.map.site(place) else { return 1.0 };
-        so(share(self.nearest_m(place, &here)), VISITED_BY_CHANCE, before)
-    }
-
-    /// How near the path came before on the same floor, up to some metres before the place. Far stretches are
-    /// skipped: a path is no shorter than the straight line.
-    fn nearest_m(&self, place: Vertex, here: &Site) -> f64 {
-        let Map { particle: Particle { belief, .. }, floors, .. } = &self.map;
-        let end = place.saturating_sub(VISITED_BACK).min(belief.len() as Vertex);
-        let (mut v, mut nearest_m) = (0, f64::INFINITY);
-        while v < end {
-            let part = floors.part(v);
-            if floors.floor(part) != here.floor {
-                v = floors.ends.get(part).map_or(end, |&next| next);
-                continue;
-            }
-            let distance_m = belief.pose(v).distance_m(&here.pose);
-            nearest_m = nearest_m.min(distance_m);
-            v += (((distance_m - nearest_m.min(REACH_M)) / SPACING_MAX_M) as Vertex).max(1);
-        }
-        nearest_m
-    }
-}
-
-/// One particle's map.
-struct Map<'a> {
-    talk: &'a Talk,
-    graph: &'a Graph,
-    floors: Floors,
-    particle: &'a Particle,
-}
-
-impl<'a> Map<'a> {
-    /// A place in it.
-    fn site(&self, v: Vertex) -> Option<Site<'a>> {
-        let (told, floors) = (&self.talk.testimonies, &self.floors);
-        let part = told.part(self.particle, &floors.ends, v);
-        Some(Site {
-            pose: told.pose(self.particle, v)?,
-            floor: floors.floor(part),
-            dark: told.is_dark(v),
-            drift_m2: floors.drift_m2[part.min(floors.ends.len())],
-            enclosure: self.graph.places().get(v as usize).map(|place| &place.enclosure),
-        })
+        so(share(self.map.nearest_m(place, &here)), VISITED_BY_CHANCE, before)
     }
 }
 

@@ -2,7 +2,10 @@ use super::*;
 use crate::config::Config;
 use crate::effects::HeardStatus;
 use crate::event::Utterance;
+use crate::scan::place::Content;
+use crate::scan::tests::seen;
 use crate::smoothing::Factor;
+use crate::track::places::{Chain, FrozenPlace, OpenPlace};
 use nalgebra::{Matrix3, Vector3};
 
 /// Two particles that know a gym and a kitchen, in the first 20 m and in the second 3 m apart, and the
@@ -109,4 +112,44 @@ fn a_sentence_speaks_for_the_map_in_which_it_is_true() {
     assert!(weighed("this is where we started") > nothing + 1.0);
     assert!(weighed("this is not where we started") < nothing - 1.0);
     assert!(weighed("this is the same place as the gym") > nothing + 1.0);
+}
+
+#[test]
+fn a_room_is_no_floor_of_a_hallway() {
+    let along = |walls: &[[f64; 4]]| {
+        let (talk, mut filter) =
+            said_along(&[(2, "this is the hallway"), (4, "the library is down the hallway")]);
+        let shares = |filter: &Filter| {
+            let library = talk.ledger.label("library").unwrap();
+            filter.best().labels.described(1, library).iter().map(|s| s.share).sum::<f64>()
+        };
+        let before = shares(&filter);
+        for k in 0..61 {
+            filter.graph.add(frozen(k, walls));
+        }
+        let mut talk = talk.clone();
+        reground_all(&mut talk, &mut filter);
+        shares(&filter) / before
+    };
+    let box_of = |long_m: f64, wide_m: f64| {
+        let (x, y) = (long_m / 2.0, wide_m / 2.0);
+        [[-x, -y, x, -y], [x, -y, x, y], [x, y, -x, y], [-x, y, -x, -y]]
+    };
+    let (hallway, room) = (along(&box_of(20.0, 2.0)), along(&box_of(5.0, 5.0)));
+    assert!(hallway < 0.3 && room > 1.0, "{hallway} {room}");
+}
+
+/// The k-th place of a chain, within walls.
+fn frozen(k: u32, walls: &[[f64; 4]]) -> FrozenPlace {
+    let sweep = seen(walls, &Pose2::default());
+    let chain = Chain {
+        previous_from_this: Pose2::new(1.0, 0.0, 0.0),
+        information: Matrix3::identity(),
+        broken: false,
+        unseen: false,
+        failed: 0.0,
+    };
+    let front_from_place = Pose2::new(f64::from(k), 0.0, 0.0);
+    let open = OpenPlace { id: k.into(), stamp_ns: 0, front_from_place, path_m: f64::from(k), chain };
+    FrozenPlace { open, content: Content::new(&[(Pose2::default(), &sweep)]) }
 }
