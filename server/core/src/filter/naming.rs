@@ -67,7 +67,7 @@ fn share_of_square(distance_m2: f64) -> f64 {
 /// The same of places that see each other with no door between, and share of those near that are of one room
 /// though they do not: by `--example drives -- enclosed` of the server.
 const IN_SIGHT_M: f64 = 12.0;
-const THROUGH_WALLS: f64 = 0.05;
+const THROUGH_WALLS: f64 = 0.1;
 /// Beyond, [`share`] is less than 4·10⁻⁶.
 pub const REACH_M: f64 = 5.0 * JOINED_M;
 
@@ -366,7 +366,7 @@ mod tests {
         };
         let share = |a, b| share_between(&site(0.0, a), &site(3.0, b));
         assert!(share(Some(&hall), Some(&hall)) > 0.9, "no wall between");
-        assert!(share(Some(&closet), Some(&closet)) < 0.05, "a wall between");
+        assert!(share(Some(&closet), Some(&closet)) < 0.1, "a wall between");
         let unknown = share(None, None);
         assert!((unknown - super::share(3.0)).abs() < 1e-12, "nobody knows");
         assert!(share(Some(&closet), None) < unknown && unknown < share(Some(&hall), None));
