@@ -16,7 +16,6 @@
 use crate::geometry::Pose2;
 use crate::language::COMMON;
 use crate::scan::enclosure::{Enclosure, of_one_room};
-use std::collections::BTreeMap;
 
 /// Index of a name in the ledger.
 pub type LabelId = u32;
@@ -50,9 +49,9 @@ const ONE_YARD: f64 = 0.5;
 
 /// Over what a name holds: which sites share what is said of them.
 pub trait Support {
-    /// Calls `each` with every site that anything was said of and that is joined with `here`, itself too, and
-    /// the share of what is said there that holds here, in (0, 1].
-    fn joined(&self, here: usize, each: impl FnMut(usize, f64));
+    /// Every site that anything was said of and that is joined with `here`, itself too, and the share of what is said
+    /// there that holds here, in (0, 1].
+    fn joined(&mut self, here: usize) -> &[(u32, f64)];
 }
 
 /// Share of what is said of a place that holds for another, so far away in a particle's map.
@@ -98,7 +97,7 @@ pub fn share_between(a: &Site<'_>, b: &Site<'_>) -> f64 {
             let drift_m2 = (a.drift_m2 - b.drift_m2).abs();
             ONE_YARD + (1.0 - ONE_YARD) * within(DARK_M.powi(2) + drift_m2)
         }
-    } else if a.floor == b.floor {
+    } else if a.floor == b.floor && distance_m2 < REACH_M * REACH_M {
         let near = share_of_square(distance_m2);
         let one = of_one_room(a.enclosure, b.enclosure, &a.pose.between(&b.pose));
         one.map_or(near, |one| {
@@ -113,53 +112,35 @@ pub fn share_between(a: &Site<'_>, b: &Site<'_>) -> f64 {
 /// Places in one particle's map: what is said of one holds for what lies near, by [`share_between`].
 pub struct Near<'a> {
     sites: Vec<Site<'a>>,
-    /// Sites with anything said of them, by square of [`REACH_M`].
-    cells: BTreeMap<(i64, i64), Vec<u32>>,
-    /// Such as lie in the dark.
-    dark: Vec<u32>,
+    /// Sites with anything said of them, in the order told.
+    told: Vec<u32>,
+    /// By site, how many of those were looked at, and those that it is joined with: each pair is looked at once.
+    joined: Vec<(usize, Vec<(u32, f64)>)>,
 }
 
 impl<'a> Near<'a> {
     /// None of them has anything said of it yet.
     pub fn new(sites: Vec<Site<'a>>) -> Self {
-        Self { sites, cells: BTreeMap::new(), dark: Vec::new() }
-    }
-
-    /// One of them.
-    pub fn site(&self, site: usize) -> &Site<'a> {
-        &self.sites[site]
+        let joined = vec![(0, Vec::new()); sites.len()];
+        Self { sites, told: Vec::new(), joined }
     }
 
     /// From now on something is said of a site. Once for each.
     pub fn tell(&mut self, site: usize) {
-        let Site { pose, dark, .. } = &self.sites[site];
-        self.cells.entry(cell(pose)).or_default().push(site as u32);
-        if *dark {
-            self.dark.push(site as u32);
-        }
+        self.told.push(site as u32);
     }
 }
 
-fn cell(pose: &Pose2) -> (i64, i64) {
-    ((pose.x_m / REACH_M).floor() as i64, (pose.y_m / REACH_M).floor() as i64)
-}
-
 impl Support for Near<'_> {
-    fn joined(&self, here: usize, mut each: impl FnMut(usize, f64)) {
-        let at = &self.sites[here];
-        let (x, y) = cell(&at.pose);
-        let around = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (x + dx, y + dy)));
-        let near = around.filter_map(|c| self.cells.get(&c)).flatten();
-        let is_near = |k: &&u32| {
-            let to = &self.sites[**k as usize];
-            !(at.dark && to.dark) && to.pose.distance_m(&at.pose) < REACH_M
-        };
-        for &k in near.filter(is_near).chain(self.dark.iter().filter(|_| at.dark)) {
-            match share_between(at, &self.sites[k as usize]) {
-                0.0 => {}
-                share => each(k as usize, share),
-            }
-        }
+    fn joined(&mut self, here: usize) -> &[(u32, f64)] {
+        let Self { sites, told, joined } = self;
+        let (at, (looked_at, with)) = (&sites[here], &mut joined[here]);
+        with.extend(told[*looked_at..].iter().filter_map(|&k| {
+            let share = share_between(at, &sites[k as usize]);
+            (share > 0.0).then_some((k, share))
+        }));
+        *looked_at = told.len();
+        with
     }
 }
 

@@ -315,9 +315,11 @@ impl<'a> Fold<'a> {
         let Self { numbers, near, told, joined, .. } = self;
         joined.clear();
         if let Some(&site) = numbers.get(&place) {
-            near.joined(site, |k, share| {
-                told[k].iter().for_each(|&(label, told)| joined.add(label, told, share));
-            });
+            for &(k, share) in near.joined(site) {
+                for &(label, told) in &told[k as usize] {
+                    joined.add(label, told, share);
+                }
+            }
         }
     }
 
