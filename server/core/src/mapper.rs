@@ -72,7 +72,7 @@ pub enum SaveError {
 }
 
 /// Format of a saved map; its number changes whenever its content does.
-const FORMAT: &str = concat!("toponym map 17 of ", env!("CARGO_PKG_VERSION"), " ");
+const FORMAT: &str = concat!("toponym map 18 of ", env!("CARGO_PKG_VERSION"), " ");
 
 /// A map is exact only on the kind of machine that it was made on.
 fn format_here() -> String {
