@@ -13,6 +13,7 @@
 //!
 //! Where l was spoken of before and is no name that many rooms bear, what is new in it, and floor not seen, counts
 //! [`OF_ITS_KIND`]: "the gym" is mostly that one.
+//! What is told without "again" was told of before but every other time, [`UNMARKED`].
 
 mod map;
 mod said;
