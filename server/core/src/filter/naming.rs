@@ -1,6 +1,6 @@
 //! The one model of names: whether a name applies, what will be said next, and who is called alike.
 //!
-//! A support (a place with what lies near it; a room once rooms are known) bears names with a Dirichlet
+//! A support (a place with what is of one room with it, by what is seen from either) bears names with a Dirichlet
 //! over an open vocabulary, eq. (12): what was said of it, over a base measure p₀ of total concentration
 //! [`BASE`]. A sentence is false with probability ε = [`FALSE_TALK`]. One utterance is one unit of evidence.
 //!
@@ -41,6 +41,10 @@ const COMMON_SHARE: f64 = 0.5;
 /// How near two places are for what is said of one to be expected of the other: standard deviation
 /// of a Gaussian kernel, the size of a room.
 const JOINED_M: f64 = 3.0;
+/// The same of places that see each other with no door between, and what share of [`JOINED_M`] is left where they
+/// do not: read off the table of `--example drives -- enclosed` of the server.
+const IN_SIGHT_M: f64 = 12.0;
+const THROUGH_WALLS: f64 = 0.1;
 /// The same of places where nothing is seen: what is open so far that the laser finds no wall is one yard.
 const DARK_M: f64 = 10.0;
 /// Two such places whose floors nothing ties are of one yard so often, wherever they seem to lie: a building has
@@ -63,10 +67,6 @@ fn share_of_square(distance_m2: f64) -> f64 {
     (distance_m2 * (-0.5 / JOINED_M.powi(2))).exp()
 }
 
-/// The same of places that see each other with no door between, and share of those near that are of one room
-/// though they do not: by `--example drives -- enclosed` of the server.
-const IN_SIGHT_M: f64 = 12.0;
-const THROUGH_WALLS: f64 = 0.1;
 /// Beyond, [`share`] is less than 4·10⁻⁶.
 pub const REACH_M: f64 = 5.0 * JOINED_M;
 
@@ -109,7 +109,7 @@ pub fn share_between(a: &Site<'_>, b: &Site<'_>) -> f64 {
     }
 }
 
-/// Places in one particle's map: what is said of one holds for what lies near, by [`share_between`].
+/// Places in one particle's map: what is said of one holds for others, by [`share_between`].
 pub struct Near<'a> {
     sites: Vec<Site<'a>>,
     /// Sites with anything said of them, in the order told.

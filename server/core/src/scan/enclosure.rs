@@ -23,8 +23,8 @@ const SILL_M: f64 = 0.4;
 const DRIVEN_M: f64 = 0.35;
 /// How sharp its edge is: what places and doors are off by.
 const EDGE_M: f64 = 0.3;
-/// As many times as long as wide, every second is a way's, and how steeply: by `--example drives -- enclosed` of the
-/// server.
+/// As many times as long as wide, every second is a way's, and how steeply: read off the table of
+/// `--example drives -- enclosed` of the server.
 const WAY: (f64, f64) = (2.6, 1.0);
 
 /// The floor around a place as far as its room reaches.

@@ -13,7 +13,7 @@
 //!
 //! Where l was spoken of before and is no name that many rooms bear, what is new in it, and floor not seen, counts
 //! [`OF_ITS_KIND`]: "the gym" is mostly that one.
-//! What is told without "again" was told of before but every other time, [`UNMARKED`].
+//! What is said without "again" counts [`UNMARKED`] where it was told of: who knows that it was says so the other times.
 
 mod map;
 mod said;
@@ -36,7 +36,7 @@ use std::f64::consts::TAU;
 const ONE_BY_CHANCE: f64 = 1.0 / 30.0;
 /// "The hallway again" and "back in the lobby" mean another of the kind so often.
 const OF_ITS_KIND: [f64; 2] = [0.9, 0.3];
-/// Who speaks of what was told of says so, "again", the other times (Heim, 1991): assumed.
+/// So many of those who speak of what was told of do not say "again" (who presupposes it says so: Heim, 1991): assumed.
 const UNMARKED: f64 = 0.5;
 /// How often a place has been seen before when somebody speaks of it.
 const VISITED_BY_CHANCE: f64 = 0.3;
