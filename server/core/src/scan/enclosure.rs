@@ -1,7 +1,7 @@
 //! What is of one room with a place: the floor that its scans show short of walls, and of narrowings no wider than a
 //! door.
 
-use crate::geometry::Pose2;
+use crate::geometry::{Pose2, is_near};
 use crate::scan::place::Content;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -92,7 +92,7 @@ fn posts(Content { cloud, views, .. }: &Content) -> Posts {
     for p in cloud {
         let (x, y) = (f64::from(p.x), f64::from(p.y));
         // Nothing stands where the robot drove: who leads it walks there.
-        if driven.windows(2).any(|leg| off_m((x, y), leg[0], leg[1]) < DRIVEN_M) {
+        if driven.windows(2).any(|leg| is_near(leg, (x, y), DRIVEN_M)) {
             continue;
         }
         let (m, nearest) = (x.hypot(y), &mut posts[ray(x, y)]);
@@ -101,14 +101,6 @@ fn posts(Content { cloud, views, .. }: &Content) -> Posts {
         }
     }
     posts
-}
-
-/// How far a point lies off a stretch of way.
-fn off_m(p: (f64, f64), from: (f64, f64), to: (f64, f64)) -> f64 {
-    let (dx, dy) = (to.0 - from.0, to.1 - from.1);
-    let along = ((p.0 - from.0) * dx + (p.1 - from.1) * dy) / (dx * dx + dy * dy).max(f64::MIN_POSITIVE);
-    let along = along.clamp(0.0, 1.0);
-    (p.0 - from.0 - along * dx).hypot(p.1 - from.1 - along * dy)
 }
 
 /// How wide it is where one stands: the shortest way across.
